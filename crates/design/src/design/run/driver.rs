@@ -8,7 +8,7 @@ use obsdeg_evidence::simulation::omitted::omitted_effects;
 use obsdeg_evidence::simulation::{Attained, Conditions, MeasurementReport, latitude_of, other_carries};
 use obsdeg_exact::parallel;
 
-use crate::design::answer::{Design, Found, PartsReport, SCHEMA, SearchReport, TiesReport};
+use crate::design::answer::{Certificate, Design, Found, PartsReport, SCHEMA, SearchReport, TiesReport};
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::PROOF;
 use crate::design::request::options::DesignOptions;
@@ -18,6 +18,8 @@ use crate::design::run::task::{Task, asked};
 use crate::design::run::{alternatives, certify, winner};
 use crate::design::search::best::Best;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
+use crate::design::search::score::Scored;
+use crate::design::search::scoring::Search;
 use crate::design::search::ties::TIE;
 
 /// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the
@@ -57,129 +59,211 @@ pub(crate) fn answered(
             free.as_ref().map(|f| DesignOptions { candidates: f.candidates.clone(), ..options.clone() });
         let options = chosen.as_ref().unwrap_or(options);
         let prepared = Prepared::new(base, conditions, options, &going)?;
-        let task = &prepared.task;
-        let minimum = task.minimum(&prepared.degrees, &going)?;
-        let mut sets = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
-        let mut out = Design {
-            schema: SCHEMA.into(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            carry: base.carry,
-            latitude_deg: latitude_of(base).map_or(0.0, |l| l.degrees()),
-            latitude_by_default: base.latitude.is_none(),
-            geometry: base.geometry,
-            terms: base.unknowns.to_string(),
-            candidates: task.candidates.names.clone(),
-            beyond_gimbals: prepared.beyond.clone(),
-            symmetry: task.symmetry.order,
-            required: task.required.iter().map(|r| r.0.clone()).collect(),
-            minimum,
-            search: None,
-            found: Vec::new(),
-            front: Vec::new(),
-            bias_front: Vec::new(),
-            bias_front_complete: false,
-            omitted: None,
-            other_carries: Vec::new(),
-            not_judged: not_judged(stated, conditions),
-            gimbals: None,
-            primes: task.rows.fields(),
-            error_bound: task.rows.error_bound(sets),
-            seed: options.seed,
-        };
-        out.minimum.proven &= out.error_bound < PROOF;
+        let (mut out, mut sets) = fewest(&prepared, stated, &going)?;
         let Some(k) = options.positions else { return Ok(out) };
         prepared.check(k)?;
-        let evaluator = &prepared.evaluator;
+        let (task, evaluator) = (&prepared.task, &prepared.evaluator);
         let search = prepared.search(progress);
+        let run = SchemeSearch { prepared: &prepared, free: free.as_ref(), search, k, going: &going };
         let bound = task.bound(evaluator, k, &going);
         let (merged, parts) = elsewhere.map(|parts| parts(&prepared, k)).transpose()?.unzip();
         let (best, exhaustive) = match (merged, &free) {
             (Some(merged), _) => (merged, task.space(k, evaluator)),
-            (None, Some(free)) => free.searched(&prepared, &search, k)?,
-            (None, None) => prepared.searched(&search, k, bound.as_ref()),
+            (None, Some(free)) => free.searched(&prepared, &run.search, k)?,
+            (None, None) => prepared.searched(&run.search, k, bound.as_ref()),
         };
         if let Some((more, _)) = exhaustive {
             sets += more as f64;
             out.error_bound = task.rows.error_bound(sets);
         }
-        let all = exhaustive.is_some() && best.complete;
-        out.found = task.all_found(evaluator, &best.found)?;
-        if task.is_noisy() {
-            out.found.sort_by(|a, b| a.worst_degree.cmp(&b.worst_degree).then(a.value.total_cmp(&b.value)));
-        }
-        if task.ranks() {
-            out.found.truncate(options.keep.max(1));
-        }
-        task.mark_images(&mut out.found, evaluator.ordered());
+        out.found = run.listed(&best)?;
         let Some(first) = best.found.first().filter(|_| !out.found.is_empty()) else {
-            let (positions, wanted) = (k, task.wanted());
-            let error = match (best.complete, exhaustive) {
-                (false, _) => return Err(DesignError::Interrupted),
-                (true, Some(_)) if !task.ranks() => DesignError::Impossible {
-                    positions,
-                    wanted,
-                    why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
-                },
-                (true, _) => DesignError::NotFound { positions, wanted, examined: best.examined },
-            };
-            if !options.meet {
-                return Err(error);
-            }
-            let nearest = alternatives::seek(base, conditions, options, k, progress)?;
-            return Err(DesignError::NotMet { why: Box::new(error), nearest: Box::new(nearest) });
+            return Err(run.nothing_found(&best, exhaustive.is_some()));
         };
         out.front = task.all_found(evaluator, &best.front)?;
         // the bound is for samples without random drift: figures with drift may exceed it by any amount
         let certified = bound.filter(|_| !task.is_noisy());
         let mut certificate = certified.map(|bound| task.certificate(&bound, task.value(evaluator, first)));
         if best.complete {
-            (out.bias_front, out.bias_front_complete) = task.bias_front(evaluator, &search, k, &best);
-            let of = (k, conditions.dwell_s);
-            let wanted = certificate.is_some() && options.everywhere && free.is_none();
-            let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, &going)).flatten();
-            let line = || certificate.is_some().then(|| task.front_bound(evaluator, of, &going));
-            let (front, (found, line)) = parallel::join(
-                || task.front(evaluator, &search, of, &best),
-                || parallel::join(over_all, line),
-            );
-            out.front.extend(front?);
-            if let (Some(certificate), Some(line)) = (&mut certificate, line) {
-                let every = free.as_ref().map(|f| &f.every).or(found.as_ref());
-                certificate.everywhere = every.map(|every| {
-                    let rounded = options.free.zip(free.as_ref()).map(|(step, f)| (step, f.finer.as_ref()));
-                    certify::everywhere(every, task.value_among_all(evaluator, first), rounded)
-                });
-                certificate.front = line;
-            }
+            (out.bias_front, out.bias_front_complete) = task.bias_front(evaluator, &run.search, k, &best);
+            run.add_front(&best, first, &mut out.front, certificate.as_mut())?;
         }
-        if options.refine && going() {
-            let refined = task.refined(evaluator, first, &going)?;
+        run.polish(first, &mut out)?;
+        out.front = pareto(std::mem::take(&mut out.front));
+        run.judge_first(&mut out)?;
+        let all = exhaustive.is_some() && best.complete;
+        out.search = Some(SearchReport {
+            parts,
+            interrupted: stopped.load(Ordering::Relaxed),
+            certificate,
+            ..run.report(&best, all, out.error_bound)
+        });
+        winner::within_gimbals(&mut out, base, conditions)?;
+        Ok(out)
+    })
+}
+
+/// Answer on the fewest positions, without a search, and the number of sets that were judged. `stated` are
+/// the conditions with all requirements.
+fn fewest(
+    prepared: &Prepared<'_>,
+    stated: &Conditions,
+    going: &(dyn Fn() -> bool + Sync),
+) -> Result<(Design, f64), DesignError> {
+    let task = &prepared.task;
+    let base = task.base;
+    let minimum = task.minimum(&prepared.degrees, going)?;
+    let sets = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
+    let mut out = Design {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        carry: base.carry,
+        latitude_deg: latitude_of(base).map_or(0.0, |l| l.degrees()),
+        latitude_by_default: base.latitude.is_none(),
+        geometry: base.geometry,
+        terms: base.unknowns.to_string(),
+        candidates: task.candidates.names.clone(),
+        beyond_gimbals: prepared.beyond.clone(),
+        symmetry: task.symmetry.order,
+        required: task.required.iter().map(|r| r.0.clone()).collect(),
+        minimum,
+        search: None,
+        found: Vec::new(),
+        front: Vec::new(),
+        bias_front: Vec::new(),
+        bias_front_complete: false,
+        omitted: None,
+        other_carries: Vec::new(),
+        not_judged: not_judged(stated, prepared.conditions),
+        gimbals: None,
+        primes: task.rows.fields(),
+        error_bound: task.rows.error_bound(sets),
+        seed: task.options.seed,
+    };
+    out.minimum.proven &= out.error_bound < PROOF;
+    Ok((out, sets))
+}
+
+/// Search for schemes of `k` positions.
+struct SchemeSearch<'a> {
+    prepared: &'a Prepared<'a>,
+    /// Free attitudes; `None` for given candidates.
+    free: Option<&'a Free>,
+    search: Search<'a>,
+    k: usize,
+    /// Cancellation callback: false stops the search.
+    going: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl SchemeSearch<'_> {
+    /// Schemes of the best sequences as they are listed.
+    fn listed(&self, best: &Best) -> Result<Vec<Found>, DesignError> {
+        let (task, evaluator) = (&self.prepared.task, &self.prepared.evaluator);
+        let mut found = task.all_found(evaluator, &best.found)?;
+        if task.is_noisy() {
+            found.sort_by(|a, b| a.worst_degree.cmp(&b.worst_degree).then(a.value.total_cmp(&b.value)));
+        }
+        if task.ranks() {
+            found.truncate(task.options.keep.max(1));
+        }
+        task.mark_images(&mut found, evaluator.ordered());
+        Ok(found)
+    }
+
+    /// Reason why no scheme was found, with the changes that would meet every requirement if these are
+    /// asked for.
+    fn nothing_found(&self, best: &Best, exhaustive: bool) -> DesignError {
+        let (task, conditions) = (&self.prepared.task, self.prepared.conditions);
+        let (positions, wanted) = (self.k, task.wanted());
+        let error = match (best.complete, exhaustive) {
+            (false, _) => return DesignError::Interrupted,
+            (true, true) if !task.ranks() => DesignError::Impossible {
+                positions,
+                wanted,
+                why: examined(best.lost, conditions.slew_rate_deg_s.is_some()),
+            },
+            (true, _) => DesignError::NotFound { positions, wanted, examined: best.examined },
+        };
+        if !task.options.meet {
+            return error;
+        }
+        match alternatives::seek(task.base, conditions, task.options, self.k, self.search.progress) {
+            Ok(nearest) => DesignError::NotMet { why: Box::new(error), nearest: Box::new(nearest) },
+            Err(e) => e,
+        }
+    }
+
+    /// Adds the front of total time, and to the certificate the bounds over time and over all attitudes.
+    fn add_front(
+        &self,
+        best: &Best,
+        first: &Scored,
+        front: &mut Vec<Found>,
+        certificate: Option<&mut Certificate>,
+    ) -> Result<(), DesignError> {
+        let (task, evaluator) = (&self.prepared.task, &self.prepared.evaluator);
+        let (search, free, going, k) = (&self.search, self.free, self.going, self.k);
+        let options = task.options;
+        let of = (k, self.prepared.conditions.dwell_s);
+        let certified = certificate.is_some();
+        let wanted = certified && options.everywhere && free.is_none();
+        let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, going)).flatten();
+        let line = || certified.then(|| task.front_bound(evaluator, of, going));
+        let (more, (found, line)) =
+            parallel::join(|| task.front(evaluator, search, of, best), || parallel::join(over_all, line));
+        front.extend(more?);
+        if let (Some(certificate), Some(line)) = (certificate, line) {
+            let every = free.map(|f| &f.every).or(found.as_ref());
+            certificate.everywhere = every.map(|every| {
+                let rounded = options.free.zip(free).map(|(step, f)| (step, f.finer.as_ref()));
+                certify::everywhere(every, task.value_among_all(evaluator, first), rounded)
+            });
+            certificate.front = line;
+        }
+        Ok(())
+    }
+
+    /// Adds the first scheme with its angles refined, and with its time divided, as far as they are asked
+    /// for.
+    fn polish(&self, first: &Scored, out: &mut Design) -> Result<(), DesignError> {
+        let (task, evaluator, going) = (&self.prepared.task, &self.prepared.evaluator, self.going);
+        if task.options.refine && going() {
+            let refined = task.refined(evaluator, first, going)?;
             out.front.extend(refined.iter().cloned());
             let refined = refined.filter(|f| improves(task, f, out.found.first()));
             put_first(&mut out.found, refined);
         }
-        if options.divide && going() {
-            let divided = task.divided(evaluator, first, &going)?;
+        if task.options.divide && going() {
+            let divided = task.divided(evaluator, first, going)?;
             out.front.extend(divided.iter().cloned());
             let divided = divided.filter(|f| improves(task, f, out.found.first()));
             put_first(&mut out.found, divided);
         }
-        out.front = pareto(std::mem::take(&mut out.front));
-        out.other_carries = match out.found.first() {
-            Some(best) => {
-                let scheme = winner::scheme(best, base, conditions)?;
-                let own = Conditions::of(&scheme);
-                let attained = Attained::new(&scheme, &own, options.seed)?;
-                out.omitted = Some(omitted_effects(&attained, &own, options.seed)?);
-                other_carries(&scheme, &own, options.seed)?
-            }
-            None => Vec::new(),
-        };
-        out.search = Some(SearchReport {
-            positions: k,
+        Ok(())
+    }
+
+    /// Adds errors that are not estimated, and the other carries, of the first scheme.
+    fn judge_first(&self, out: &mut Design) -> Result<(), DesignError> {
+        let Some(best) = out.found.first() else { return Ok(()) };
+        let seed = self.prepared.task.options.seed;
+        let scheme = winner::scheme(best, self.prepared.task.base, self.prepared.conditions)?;
+        let own = Conditions::of(&scheme);
+        let attained = Attained::new(&scheme, &own, seed)?;
+        out.omitted = Some(omitted_effects(&attained, &own, seed)?);
+        out.other_carries = other_carries(&scheme, &own, seed)?;
+        Ok(())
+    }
+
+    /// Report of the search, without parts and certificate, as if it was not interrupted. `all` is true if
+    /// all sequences were searched.
+    fn report(&self, best: &Best, all: bool, error_bound: f64) -> SearchReport {
+        let (task, evaluator) = (&self.prepared.task, &self.prepared.evaluator);
+        let conditions = self.prepared.conditions;
+        SearchReport {
+            positions: self.k,
             // positions that are searched for have the dwell of the conditions
             conditions: MeasurementReport::new(
-                &Scheme { positions: Scheme::of_angles([zero()]).positions, ..base.clone() },
+                &Scheme { positions: Scheme::of_angles([zero()]).positions, ..task.base.clone() },
                 conditions,
             ),
             drift_noise: conditions.as_stated().drift_noise_in_words(),
@@ -189,20 +273,18 @@ pub(crate) fn answered(
             examined: best.examined,
             excluded: best.excluded,
             lost: best.lost,
-            sequences: task.space(k, evaluator).map(|s| s.1).filter(|_| !all && free.is_none()),
-            proven: all && out.error_bound < PROOF && !task.is_noisy(),
-            parts,
+            sequences: task.space(self.k, evaluator).map(|s| s.1).filter(|_| !all && self.free.is_none()),
+            proven: all && error_bound < PROOF && !task.is_noisy(),
+            parts: None,
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
             order_matters: evaluator.ordered(),
-            interrupted: stopped.load(Ordering::Relaxed),
-            degree_floor: (!task.walks).then_some(search.floor),
+            interrupted: false,
+            degree_floor: (!task.walks).then_some(self.search.floor),
             constraints: task.constraints_in_words(),
             ranked: task.ranks().then_some(best.found.len()),
-            certificate,
-        });
-        winner::within_gimbals(&mut out, base, conditions)?;
-        Ok(out)
-    })
+            certificate: None,
+        }
+    }
 }
 
 /// Names of stated requirements that `conditions` leave out.

@@ -87,6 +87,163 @@ pub(crate) struct Task<'a> {
     pub(crate) walks: bool,
 }
 
+/// Checks the numbers of candidates and positions, the limits, and that the base and all angles are of a kind
+/// that a search takes.
+fn check(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+    candidates: &Candidates,
+) -> Result<(), DesignError> {
+    let found = candidates.attitudes.len();
+    if !(1..=MAX_CANDIDATES).contains(&found) {
+        return Err(DesignError::Candidates { found });
+    }
+    let counts = options.positions.iter().chain(&options.front);
+    if let Some(&found) = counts.into_iter().find(|k| !(1..=100).contains(*k)) {
+        return Err(DesignError::Positions { found });
+    }
+    if base.unknowns == Unknowns::Drift {
+        return Err(DesignError::Drift);
+    }
+    for (what, limit) in [("a total time", options.total_s), ("a longest slew", options.slew_s)] {
+        if let Some(found) = limit.filter(|l| !(l.is_finite() && *l > 0.0)) {
+            return Err(DesignError::Limit { what, found });
+        }
+    }
+    if base.path == Some(Path::Gimbals) && conditions.slew_rate_deg_s.is_some() {
+        return Err(DesignError::GimbalPath);
+    }
+    let generic = candidates.attitudes.iter().flatten().find_map(|a| a.generic());
+    if let Some((name, _)) = generic {
+        return Err(DesignError::GenericAngle { name: name.into() });
+    }
+    Ok(())
+}
+
+/// Indices of the coefficients that a name or a family concerns.
+fn named(all: &[(String, usize)], asked: &str) -> Result<Vec<usize>, DesignError> {
+    let known = all.iter().map(|c| c.0.clone()).collect::<Vec<_>>().join(", ");
+    let found: Vec<usize> = all.iter().filter(|c| concerns(asked, &c.0)).map(|c| c.1).collect();
+    let unknown = DesignError::UnknownName { found: asked.into(), known };
+    if found.is_empty() { Err(unknown) } else { Ok(found) }
+}
+
+/// Coefficients that count, with their indices: those asked for, by default all.
+fn required(all: &[(String, usize)], options: &DesignOptions) -> Result<Vec<(String, usize)>, DesignError> {
+    let mut required = all.to_vec();
+    if !options.required.is_empty() {
+        let asked = options.required.iter().map(|name| named(all, name));
+        let asked = asked.collect::<Result<Vec<_>, _>>()?.concat();
+        required.retain(|c| asked.contains(&c.1));
+    }
+    Ok(required)
+}
+
+/// Largest degree of every coefficient that counts; the largest number where there is no limit.
+fn caps(
+    all: &[(String, usize)],
+    required: &[(String, usize)],
+    options: &DesignOptions,
+) -> Result<Vec<usize>, DesignError> {
+    let mut caps = vec![usize::MAX; required.len()];
+    for (name, cap) in widest_first(&options.degree_caps) {
+        let concerned = name.as_ref().map(|name| named(all, name)).transpose()?;
+        for (slot, c) in caps.iter_mut().zip(required) {
+            if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
+                *slot = *cap;
+            }
+        }
+    }
+    Ok(caps)
+}
+
+/// Refuses requirements and priors of single positions.
+fn check_positions_of(conditions: &Conditions) -> Result<(), DesignError> {
+    for (what, list) in [("requirement", &conditions.requirements[..]), ("prior", conditions.stated_priors())]
+    {
+        if let Some(of_one) = list.iter().find(|a| a.name.contains('@')) {
+            return Err(DesignError::OnePosition { what, found: of_one.name.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// True if the search uses requirements, as a constraint or as its criterion.
+fn uses_requirements(options: &DesignOptions) -> bool {
+    options.meet || options.criterion == CriterionName::Margin
+}
+
+/// Largest sigmas of the coefficients that count and of psi; refused if the search uses requirements and none
+/// is stated.
+fn limits(
+    platform: &Platform,
+    conditions: &Conditions,
+    required: &[(String, usize)],
+    options: &DesignOptions,
+) -> Result<Limits, DesignError> {
+    let limits_of = resolve("required sigma", platform, &conditions.requirements, f64::INFINITY)?;
+    let first = platform.names().len() - platform.coefficients();
+    let limits = Limits {
+        coefficients: required.iter().map(|c| limits_of[first + c.1]).collect(),
+        psi: [0, 1, 2].map(|k| limits_of[k]),
+    };
+    let all = || limits.coefficients.iter().chain(&limits.psi);
+    if uses_requirements(options) && all().all(|l| l.is_infinite()) {
+        let what = if options.meet { "--meet" } else { "--criterion margin" };
+        return Err(DesignError::NoRequirement { what });
+    }
+    Ok(limits)
+}
+
+/// Criterion of this name; the margin is that to the limits.
+fn criterion(name: CriterionName, limits: &Limits) -> Criterion {
+    match name {
+        CriterionName::Worst => Criterion::Worst,
+        CriterionName::A => Criterion::A,
+        CriterionName::D => Criterion::D,
+        CriterionName::E => Criterion::E,
+        CriterionName::Margin => Criterion::Margin(limits.clone()),
+    }
+}
+
+/// Demands of a task on the coefficients, by which a turn of the platform axes may rename them.
+struct Demands<'a> {
+    /// Indices of the coefficients that count.
+    required: &'a [usize],
+    /// Largest degree of each of these.
+    caps: &'a [usize],
+    /// Largest sigma of each of these; `None` if the search does not use requirements.
+    limits: Option<&'a [f64]>,
+    /// Prior sigma of every coefficient.
+    priors: &'a [f64],
+    /// True if psi may be renamed too, so that any coefficient may.
+    renames: bool,
+}
+
+impl Demands<'_> {
+    /// True if the demands on two coefficients are the same.
+    fn are_alike(&self, i: usize, j: usize) -> bool {
+        let place = |c: usize| self.required.iter().position(|r| *r == c);
+        match (place(i), place(j)) {
+            _ if (!self.renames || self.priors[i] != self.priors[j]) && i != j => false,
+            (None, None) => true,
+            (Some(i), Some(j)) => {
+                self.caps[i] == self.caps[j] && self.limits.is_none_or(|limits| limits[i] == limits[j])
+            }
+            _ => false,
+        }
+    }
+}
+
+/// Candidates orbit by orbit: a set that begins with a representative stands for all its images. `kept` are
+/// the candidates of the symmetry.
+fn by_orbits(symmetry: &Symmetry, kept: Vec<usize>) -> Vec<usize> {
+    let mut order: Vec<(usize, usize)> = symmetry.orbit.iter().copied().zip(kept).collect();
+    order.sort_unstable();
+    order.into_iter().map(|(_, c)| c).collect()
+}
+
 impl<'a> Task<'a> {
     pub(crate) fn new(
         base: &'a Scheme,
@@ -95,71 +252,17 @@ impl<'a> Task<'a> {
         candidates: Candidates,
     ) -> Result<Self, DesignError> {
         conditions.validate()?;
-        let found = candidates.attitudes.len();
-        if !(1..=MAX_CANDIDATES).contains(&found) {
-            return Err(DesignError::Candidates { found });
-        }
-        let counts = options.positions.iter().chain(&options.front);
-        if let Some(&found) = counts.into_iter().find(|k| !(1..=100).contains(*k)) {
-            return Err(DesignError::Positions { found });
-        }
-        if base.unknowns == Unknowns::Drift {
-            return Err(DesignError::Drift);
-        }
-        for (what, limit) in [("a total time", options.total_s), ("a longest slew", options.slew_s)] {
-            if let Some(found) = limit.filter(|l| !(l.is_finite() && *l > 0.0)) {
-                return Err(DesignError::Limit { what, found });
-            }
-        }
-        if base.path == Some(Path::Gimbals) && conditions.slew_rate_deg_s.is_some() {
-            return Err(DesignError::GimbalPath);
-        }
-        let generic = candidates.attitudes.iter().flatten().find_map(|a| a.generic());
-        if let Some((name, _)) = generic {
-            return Err(DesignError::GenericAngle { name: name.into() });
-        }
+        check(base, conditions, options, &candidates)?;
         let positions = Scheme::of_angles(candidates.attitudes.iter().take(1).cloned()).positions;
         let platform = Platform::new(Scheme { positions, combinations: Vec::new(), ..base.clone() })?;
         let first = platform.names().len() - platform.coefficients();
         let all: Vec<(String, usize)> = platform.names()[first..].iter().cloned().zip(0..).collect();
-        let named = |asked: &String| {
-            let known = all.iter().map(|c| c.0.clone()).collect::<Vec<_>>().join(", ");
-            let found: Vec<usize> = all.iter().filter(|c| concerns(asked, &c.0)).map(|c| c.1).collect();
-            let unknown = DesignError::UnknownName { found: asked.clone(), known };
-            if found.is_empty() { Err(unknown) } else { Ok(found) }
-        };
-        let mut required = all.clone();
-        if !options.required.is_empty() {
-            let asked = options.required.iter().map(named).collect::<Result<Vec<_>, _>>()?.concat();
-            required.retain(|c| asked.contains(&c.1));
-        }
-        let mut caps = vec![usize::MAX; required.len()];
-        for (name, cap) in widest_first(&options.degree_caps) {
-            let concerned = name.as_ref().map(named).transpose()?;
-            for (slot, c) in caps.iter_mut().zip(&required) {
-                if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
-                    *slot = *cap;
-                }
-            }
-        }
-        for (what, list) in
-            [("requirement", &conditions.requirements[..]), ("prior", conditions.stated_priors())]
-        {
-            if let Some(of_one) = list.iter().find(|a| a.name.contains('@')) {
-                return Err(DesignError::OnePosition { what, found: of_one.name.clone() });
-            }
-        }
+        let required = required(&all, options)?;
+        let caps = caps(&all, &required, options)?;
+        check_positions_of(conditions)?;
         let priors = resolve(PRIOR, &platform, conditions.stated_priors(), f64::INFINITY)?;
-        let limits_of = resolve("required sigma", &platform, &conditions.requirements, f64::INFINITY)?;
-        let limits = Limits {
-            coefficients: required.iter().map(|c| limits_of[first + c.1]).collect(),
-            psi: [0, 1, 2].map(|k| limits_of[k]),
-        };
-        let uses_requirements = options.meet || options.criterion == CriterionName::Margin;
-        if uses_requirements && limits.coefficients.iter().chain(&limits.psi).all(|l| l.is_infinite()) {
-            let what = if options.meet { "--meet" } else { "--criterion margin" };
-            return Err(DesignError::NoRequirement { what });
-        }
+        let limits = limits(&platform, conditions, &required, options)?;
+        let uses_requirements = uses_requirements(options);
         // the total uncertainty of psi is that at the end, which is not built up position by position
         let of_psi = uses_requirements && limits.psi.iter().any(|l| l.is_finite());
         // where the number of positions is searched for, errors of single positions do not exist
@@ -167,13 +270,7 @@ impl<'a> Task<'a> {
             .map_err(SimulationError::from)?;
         let omitted = Omitted::of(base, &platform, conditions, &options.immune)?;
         let omitted = omitted.filter(|_| !of_psi || conditions.bench.is_empty());
-        let criterion = match options.criterion {
-            CriterionName::Worst => Criterion::Worst,
-            CriterionName::A => Criterion::A,
-            CriterionName::D => Criterion::D,
-            CriterionName::E => Criterion::E,
-            CriterionName::Margin => Criterion::Margin(limits.clone()),
-        };
+        let criterion = criterion(options.criterion, &limits);
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
         let walks = is_walk(base);
         // for slew sequences the rows only tell which attitudes are the same
@@ -181,25 +278,20 @@ impl<'a> Task<'a> {
         let rows = Rows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
         // an attitude counts once
         let repeated = rows.repeated();
-        let kept: Vec<usize> = (0..found).filter(|i| !repeated.contains(i)).collect();
-        let place = |c: usize| required.iter().position(|r| r.1 == c);
+        let kept: Vec<usize> = (0..candidates.attitudes.len()).filter(|i| !repeated.contains(i)).collect();
         // a turn of the platform axes renames psi as well
-        let turned = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
+        let renames = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
             && priors[..3].iter().all(|p| *p == priors[0])
             && omitted.as_ref().is_none_or(|o| o.alike);
-        let same = |i: usize, j: usize| match (place(i), place(j)) {
-            _ if (!turned || priors[first + i] != priors[first + j]) && i != j => false,
-            (None, None) => true,
-            (Some(i), Some(j)) => {
-                caps[i] == caps[j] && (!uses_requirements || limits.coefficients[i] == limits.coefficients[j])
-            }
-            _ => false,
+        let demands = Demands {
+            required: &indices,
+            caps: &caps,
+            limits: uses_requirements.then_some(&limits.coefficients[..]),
+            priors: &priors[first..],
+            renames,
         };
-        let symmetry = rows.select(&kept).symmetry(&same);
-        // orbit by orbit: a set that begins with a representative stands for all its images
-        let mut order: Vec<(usize, usize)> = symmetry.orbit.iter().copied().zip(kept).collect();
-        order.sort_unstable();
-        let order: Vec<usize> = order.into_iter().map(|(_, c)| c).collect();
+        let same = |i: usize, j: usize| demands.are_alike(i, j);
+        let order = by_orbits(&rows.select(&kept).symmetry(&same), kept);
         let (candidates, rows) = (candidates.permuted(&order), rows.select(&order));
         let symmetry = rows.symmetry(&same);
         let constraints = Constraints {
