@@ -74,19 +74,43 @@ pub(crate) fn combinations(
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
 ) -> Vec<Combination> {
-    let field = verdicts.values[0].roots().field;
-    let n = platform.names().len();
-    let mut chosen: Vec<(Vec<u64>, usize)> = Vec::new();
-    let singles = |k: usize| -> Echelon {
-        let mut span = Echelon::new(field, n);
-        for c in (0..n).filter(|&c| verdicts.degrees.degree[c].is_some_and(|d| d <= k)) {
-            let unit: Vec<u64> = (0..n).map(|j| if j == c { field.one() } else { 0 }).collect();
-            span.insert(&unit);
-        }
-        span
+    let sum = |(vector, degree): (Vec<u64>, usize)| {
+        let mut support = support(&vector);
+        let lead = lead(platform, &support);
+        support.sort_by_key(|c| *c != lead);
+        let functional = combination_coefficients(platform, solver, &support, &vector, degree);
+        let found = functional.and_then(|f| Some((readable_sum(platform, &f.terms)?, f)));
+        solver.left_out += usize::from(found.is_none());
+        let (name, functional) = found?;
+        Some(Combination { name, vector, functional: Some(functional), degree })
     };
+    let mut out: Vec<Combination> = short_vectors(verdicts).into_iter().filter_map(sum).collect();
+    // other combinations that are determined during a turn contain turning rates, and have no name
+    if !platform.scheme().by_course() {
+        complete_by_positions(platform, verdicts, solver, &mut out);
+    }
+    out.sort_by_key(|c| c.degree);
+    out
+}
+
+/// Span of the single unknowns of degree up to k.
+fn single_unknowns(verdicts: &Verdicts, k: usize) -> Echelon {
+    let field = verdicts.values[0].roots().field;
+    let n = verdicts.degrees.degree.len();
+    let mut span = Echelon::new(field, n);
+    for c in (0..n).filter(|&c| verdicts.degrees.degree[c].is_some_and(|d| d <= k)) {
+        let unit: Vec<u64> = (0..n).map(|j| if j == c { field.one() } else { 0 }).collect();
+        span.insert(&unit);
+    }
+    span
+}
+
+/// Sparse vectors that span every `V_k` together with the single unknowns, each with its degree.
+fn short_vectors(verdicts: &Verdicts) -> Vec<(Vec<u64>, usize)> {
+    let field = verdicts.values[0].roots().field;
+    let mut chosen: Vec<(Vec<u64>, usize)> = Vec::new();
     for (k, basis) in verdicts.stairs.iter().enumerate() {
-        let mut span = singles(k);
+        let mut span = single_unknowns(verdicts, k);
         for (v, _) in &chosen {
             span.insert(v);
         }
@@ -102,22 +126,19 @@ pub(crate) fn combinations(
             chosen.extend(extend_by_short_vectors(&field, &rows, &mut span).into_iter().map(|v| (v, k)));
         }
     }
-    let sum = |(vector, degree): (Vec<u64>, usize)| {
-        let mut support = support(&vector);
-        let lead = lead(platform, &support);
-        support.sort_by_key(|c| *c != lead);
-        let functional = combination_coefficients(platform, solver, &support, &vector, degree);
-        let found = functional.and_then(|f| Some((readable_sum(platform, &f.terms)?, f)));
-        solver.left_out += usize::from(found.is_none());
-        let (name, functional) = found?;
-        Some(Combination { name, vector, functional: Some(functional), degree })
-    };
-    let mut out: Vec<Combination> = chosen.into_iter().filter_map(sum).collect();
+    chosen
+}
+
+/// Adds combinations of `psi^n` and `eps^n` at single positions until all `V_k` are spanned.
+fn complete_by_positions(
+    platform: &Platform,
+    verdicts: &Verdicts,
+    solver: &mut Solver<'_>,
+    out: &mut Vec<Combination>,
+) {
     let labels = stations(platform.scheme());
-    // other combinations that are determined during a turn contain turning rates, and have no name
-    let positions = if platform.scheme().by_course() { &[][..] } else { &verdicts.stairs[..] };
-    for (k, basis) in positions.iter().enumerate() {
-        let mut span = singles(k);
+    for (k, basis) in verdicts.stairs.iter().enumerate() {
+        let mut span = single_unknowns(verdicts, k);
         for c in out.iter().filter(|c| c.degree <= k) {
             span.insert(&c.vector);
         }
@@ -133,8 +154,6 @@ pub(crate) fn combinations(
             }
         }
     }
-    out.sort_by_key(|c| c.degree);
-    out
 }
 
 /// Exact coefficients of a combination found as `vector`, scaled to one at the first of `support`.

@@ -52,35 +52,29 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
     if platform.scheme().by_course() {
         return Err(FormulasError::Turning);
     }
+    let mut out = shared_formulas(platform, solver)?;
+    out.extend(position_formulas(platform, solver));
+    Ok(out)
+}
+
+/// Highest order of the derivatives of Z.
+const ORDER: usize = 2;
+
+/// Formulas of Z and its derivatives in `psi^n` and `eps^n`, by the engine.
+fn shared_formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, FormulasError> {
     let observed = platform.observed();
     let locals = observed.locals();
     let zeros = solver.tables.zeros;
     let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
-    let rotates = platform.scheme().rotates();
     let mut dynamics = dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), observed, |i| {
         // the engine would read `psi_x^n` as a power
         let derivative = || LOCAL_NAMES[i - locals + 3].replace("^n", "_d");
         if i < locals { LOCAL_NAMES[i].replace("^n", "_n") } else { derivative() }
     });
-    if !rotates {
+    if !platform.scheme().rotates() {
         // eps^n is constant
         dynamics.equations[3..PSI_EPS].fill(Text.zero());
     }
-    const ORDER: usize = 2;
-    let text_point = solver.symbols().point(platform, "wN", "wU");
-    let display: Vec<Vec<Vec<String>>> = platform
-        .blocks(&text_point)
-        .iter()
-        .map(|b| b.rows.iter().map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()).collect())
-        .collect();
-    let attitudes = text_point.attitudes.iter().zip(platform.scheme().stations());
-    let slopes: Vec<Option<[Vec<String>; 3]>> = attitudes
-        .map(|(c, station)| {
-            let rows = drift_derivative(platform, &Text, c, station.turned?.axis);
-            Some(rows.map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()))
-        })
-        .collect();
-    let columns: Vec<Vec<usize>> = platform.blocks(&text_point).into_iter().map(|b| b.columns).collect();
     let worker = solver.worker().ok_or(FormulasError::NoEngine)?;
     let request = Request {
         symbols: vec!["wN".into(), "wU".into()],
@@ -97,17 +91,31 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
             out.push(Formula { position: None, left: format!("{name}{}", "'".repeat(k)), right });
         }
     }
+    Ok(out)
+}
+
+/// Formulas of `psi^n` and `eps^n` of every position in the unknowns, and of `eps^n'` where the platform
+/// turns.
+fn position_formulas(platform: &Platform, solver: &Solver<'_>) -> Vec<Formula> {
+    let locals = platform.observed().locals();
+    let text_point = solver.symbols().point(platform, "wN", "wU");
+    let attitudes = text_point.attitudes.iter().zip(platform.scheme().stations());
+    let slopes = attitudes.map(|(c, station)| -> Option<[Vec<String>; 3]> {
+        let rows = drift_derivative(platform, &Text, c, station.turned?.axis);
+        Some(rows.map(|row| row.iter().map(|t| solver.symbols().display(t)).collect()))
+    });
     let first_d = platform.names().len() - platform.coefficients();
     let stations = stations(platform.scheme()).into_iter();
-    for (((station, rows), columns), slopes) in stations.zip(display).zip(columns).zip(slopes) {
+    let mut out = Vec::new();
+    for ((station, block), slopes) in stations.zip(platform.blocks(&text_point)).zip(slopes) {
         let mut push = |left: String, right| {
             out.push(Formula { position: Some(station.label.clone()), left, right });
         };
-        for (name, row) in LOCAL_NAMES[..locals].iter().zip(rows) {
-            push(
-                (*name).into(),
-                sum(row.iter().zip(&columns).map(|(t, &c)| Text.mul(t, &platform.names()[c]))),
-            );
+        for (name, row) in LOCAL_NAMES[..locals].iter().zip(&block.rows) {
+            let terms = row.iter().zip(&block.columns);
+            let term =
+                |(t, &c): (&String, &usize)| Text.mul(&solver.symbols().display(t), &platform.names()[c]);
+            push((*name).into(), sum(terms.map(term)));
         }
         for (name, row) in LOCAL_NAMES[3..PSI_EPS].iter().zip(slopes.iter().flatten()) {
             let rate = station.rate.as_deref().unwrap_or_default();
@@ -116,7 +124,7 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
             push(format!("{name}'"), right);
         }
     }
-    Ok(out)
+    out
 }
 
 /// Sum of terms with their signs.

@@ -14,12 +14,12 @@ const WIDTH: f64 = 1e-8;
 
 /// Number with a bound on its rounding error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rounded {
+pub(super) struct RoundedNumber {
     value: f64,
     error: f64,
 }
 
-impl Rounded {
+impl RoundedNumber {
     /// True for a positive number, false for a negative one; `None` if the sign is not certain.
     fn sign(self) -> Option<bool> {
         (self.value.abs() > self.error).then_some(self.value > 0.0)
@@ -42,32 +42,44 @@ pub(super) struct Roots {
     pub(super) all: bool,
 }
 
+/// Coefficients of a polynomial, lowest first, each with the sum of the magnitudes of its terms.
+type Magnified = Vec<(f64, f64)>;
+
+fn number(x: f64) -> Magnified {
+    vec![(x, x.abs())]
+}
+
+fn times(a: &[(f64, f64)], b: &[(f64, f64)]) -> Magnified {
+    let mut out = vec![(0.0, 0.0); a.len() + b.len() - 1];
+    for (i, x) in a.iter().enumerate() {
+        for (j, y) in b.iter().enumerate() {
+            out[i + j].0 += x.0 * y.0;
+            out[i + j].1 += x.1 * y.1;
+        }
+    }
+    out
+}
+
+/// Sum `a + sign b`.
+fn plus(a: &[(f64, f64)], b: &[(f64, f64)], sign: f64) -> Magnified {
+    let x = |v: &[(f64, f64)], i: usize| v.get(i).copied().unwrap_or_default();
+    (0..a.len().max(b.len()))
+        .map(|i| {
+            let (a, b) = (x(a, i), x(b, i));
+            (a.0 + sign * b.0, a.1 + b.1)
+        })
+        .collect()
+}
+
 /// Coefficients of a polynomial in one name, lowest first, with the values of the others from `at`; `None`
 /// if the expression is no polynomial.
-pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64) -> Option<Vec<Rounded>> {
-    // each coefficient with the sum of the magnitudes of its terms
-    let mut values: Vec<Vec<(f64, f64)>> = Vec::with_capacity(e.nodes.len());
+pub(super) fn coefficients(
+    e: &Expression,
+    name: &str,
+    at: &dyn Fn(&str) -> f64,
+) -> Option<Vec<RoundedNumber>> {
+    let mut values: Vec<Magnified> = Vec::with_capacity(e.nodes.len());
     let mut whole = true;
-    let times = |a: &[(f64, f64)], b: &[(f64, f64)]| {
-        let mut out = vec![(0.0, 0.0); a.len() + b.len() - 1];
-        for (i, x) in a.iter().enumerate() {
-            for (j, y) in b.iter().enumerate() {
-                out[i + j].0 += x.0 * y.0;
-                out[i + j].1 += x.1 * y.1;
-            }
-        }
-        out
-    };
-    let plus = |a: &[(f64, f64)], b: &[(f64, f64)], sign: f64| -> Vec<(f64, f64)> {
-        let x = |v: &[(f64, f64)], i: usize| v.get(i).copied().unwrap_or_default();
-        (0..a.len().max(b.len()))
-            .map(|i| {
-                let (a, b) = (x(a, i), x(b, i));
-                (a.0 + sign * b.0, a.1 + b.1)
-            })
-            .collect()
-    };
-    let number = |x: f64| vec![(x, x.abs())];
     // bound on the number of nested multiplications of sums
     let mut depth = 0.0;
     for node in &e.nodes {
@@ -109,7 +121,7 @@ pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64)
     // sums of whole numbers below 2^53 are exact
     let exact = whole && last.iter().all(|x| x.1 < 9e15);
     let unit = if exact { 0.0 } else { f64::EPSILON * depth * last.len() as f64 };
-    let rounded = last.iter().map(|x| Rounded { value: x.0, error: unit * x.1 });
+    let rounded = last.iter().map(|x| RoundedNumber { value: x.0, error: unit * x.1 });
     last.iter().all(|x| x.1.is_finite()).then(|| rounded.collect())
 }
 
@@ -119,8 +131,8 @@ pub(super) fn coefficients(e: &Expression, name: &str, at: &dyn Fn(&str) -> f64)
 /// On `0..CUT` in t and in 1/t, both signs, the polynomial is written in Bernstein's basis. By Descartes'
 /// rule it has no root if all coefficients have the same sign, and one if they change it once. Other
 /// intervals are halved by de Casteljau's construction. A coefficient below its rounding error has no sign.
-pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
-    let zero = |c: &Rounded| c.value == 0.0 && c.error == 0.0;
+pub(super) fn roots_deg(coefficients: &[RoundedNumber]) -> Option<Roots> {
+    let zero = |c: &RoundedNumber| c.value == 0.0 && c.error == 0.0;
     let used = coefficients.iter().rposition(|c| !zero(c))?;
     let lowest = coefficients.iter().position(|c| !zero(c))?;
     let mut out = Roots { deg: Vec::new(), all: used <= DEGREE };
@@ -128,14 +140,14 @@ pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
         out.deg.push(0.0);
     }
     let c = &coefficients[lowest..=used];
-    let signed = |c: &[Rounded], sign: f64| -> Vec<Rounded> {
-        let of = |(i, c): (usize, &Rounded)| Rounded {
+    let signed = |c: &[RoundedNumber], sign: f64| -> Vec<RoundedNumber> {
+        let of = |(i, c): (usize, &RoundedNumber)| RoundedNumber {
             value: if i % 2 == 1 { sign * c.value } else { c.value },
             ..*c
         };
         c.iter().enumerate().map(of).collect()
     };
-    let reversed: Vec<Rounded> = c.iter().rev().copied().collect();
+    let reversed: Vec<RoundedNumber> = c.iter().rev().copied().collect();
     if out.all {
         // angles of roots in t and in 1/t
         for (polynomial, sign, end, from_half_turn) in [
@@ -161,7 +173,7 @@ pub(super) fn roots_deg(coefficients: &[Rounded]) -> Option<Roots> {
 }
 
 /// Roots between 0 and `end`, and true if these are certainly all.
-fn positive_roots(c: &[Rounded], end: f64) -> (Vec<f64>, bool) {
+fn positive_roots(c: &[RoundedNumber], end: f64) -> (Vec<f64>, bool) {
     let (mut roots, mut all) = (Vec::new(), true);
     let mut intervals = vec![(0.0, end, bernstein(c, end))];
     let mut looked_at = 0;
@@ -189,7 +201,7 @@ fn positive_roots(c: &[Rounded], end: f64) -> (Vec<f64>, bool) {
 
 /// Coefficients of `sum c_k t^k` on `0..end` in Bernstein's basis:
 /// `b_j = sum_i C(j, i) / C(d, i) c_i end^i`.
-fn bernstein(c: &[Rounded], end: f64) -> Vec<Rounded> {
+fn bernstein(c: &[RoundedNumber], end: f64) -> Vec<RoundedNumber> {
     let d = c.len() - 1;
     let unit = f64::EPSILON * (4 * d + 8) as f64;
     (0..=d)
@@ -200,13 +212,13 @@ fn bernstein(c: &[Rounded], end: f64) -> Vec<Rounded> {
                 error += weight * (c.error + unit * c.value.abs());
                 weight *= end * (j - i) as f64 / (d - i).max(1) as f64;
             }
-            Rounded { value: sum, error }
+            RoundedNumber { value: sum, error }
         })
         .collect()
 }
 
 /// Number of changes of sign; `None` if it is not certain.
-fn changes(b: &[Rounded]) -> Option<usize> {
+fn changes(b: &[RoundedNumber]) -> Option<usize> {
     let signs: Vec<Option<bool>> = b.iter().map(|x| x.sign()).collect();
     // an unknown sign between two different signs does not count
     let idle = |j: usize| {
@@ -222,7 +234,7 @@ fn changes(b: &[Rounded]) -> Option<usize> {
 }
 
 /// The polynomial on each half of an interval.
-fn halves(mut b: Vec<Rounded>) -> (Vec<Rounded>, Vec<Rounded>) {
+fn halves(mut b: Vec<RoundedNumber>) -> (Vec<RoundedNumber>, Vec<RoundedNumber>) {
     let mut left = Vec::with_capacity(b.len());
     for n in (0..b.len()).rev() {
         left.push(b[0]);
@@ -234,7 +246,7 @@ fn halves(mut b: Vec<Rounded>) -> (Vec<Rounded>, Vec<Rounded>) {
 }
 
 /// The only root in an interval; `None` if rounding hides its place.
-fn refine(mut low: f64, mut high: f64, mut b: Vec<Rounded>) -> Option<f64> {
+fn refine(mut low: f64, mut high: f64, mut b: Vec<RoundedNumber>) -> Option<f64> {
     loop {
         let middle = (low + high) / 2.0;
         let before = b[0].sign()?;
@@ -293,7 +305,7 @@ mod tests {
         are("(1000*t_a-1001)^2+1", &[]);
         let many: String = (0..8).map(|k| format!("*({k}-5*t_a)")).collect();
         are(&many[1..], &(0..8).map(|k| deg(f64::from(k) / 5.0)).collect::<Vec<_>>());
-        assert_eq!(roots_deg(&[Rounded { value: 0.0, error: 0.0 }; 2]), None);
+        assert_eq!(roots_deg(&[RoundedNumber { value: 0.0, error: 0.0 }; 2]), None);
     }
 
     #[test]
@@ -323,7 +335,7 @@ mod tests {
             let steps = 20_000;
             let at = |i: usize| std::f64::consts::PI * (2.0 * i as f64 / steps as f64 - 1.0);
             let crossed = (0..steps).filter(|&i| (f(at(i)) > 0.0) != (f(at(i + 1)) > 0.0)).count();
-            let c: Vec<Rounded> = c.iter().map(|x| Rounded { value: *x, error: 0.0 }).collect();
+            let c: Vec<RoundedNumber> = c.iter().map(|x| RoundedNumber { value: *x, error: 0.0 }).collect();
             let found = roots_deg(&c).expect("not zero");
             assert!(found.all && found.deg.len() == crossed, "{degree}: {found:?} {crossed}");
             assert!(found.deg.iter().all(|x| f(x.to_radians()).abs() < 1e-9));
