@@ -5,7 +5,7 @@ use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, WorkerError, protoc
 
 use super::local::ZTerm;
 use super::problem::{LinearSystem, SystemOutputs};
-use super::solve::{Contribution, Key, UsedRow};
+use super::solve::{Contribution, TermKey, UsedRow};
 use super::solver::{Functional, Solver};
 use super::turning::drift_derivative;
 use crate::degree::coefficient::{Number, Rates};
@@ -48,7 +48,7 @@ impl Solver<'_> {
         functional: &Functional,
         problem: &LinearSystem,
         used: &[UsedRow],
-        plan: &[(Key, Vec<Contribution>)],
+        plan: &[(TermKey, Vec<Contribution>)],
     ) -> Option<Vec<String>> {
         let text = self.text_or_none()?;
         let mut target = vec![(Text.zero(), Text.one()); self.platform.names().len()];

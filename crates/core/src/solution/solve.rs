@@ -102,7 +102,7 @@ pub(crate) enum Unsolved {
 
 /// Place of a term in a solution; the order is the order of printing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key {
+pub(super) struct TermKey {
     pub(super) turns: usize,
     pub(super) order: usize,
     pub(super) component: usize,
@@ -129,6 +129,14 @@ pub(super) struct UsedRow {
     pub(super) row: usize,
     pub(super) rates: Rates,
     pub(super) turns: usize,
+}
+
+/// System of linear equations for the amounts of some rows, and its solution.
+struct RowSystem {
+    system: LinearSystem,
+    /// Rates and numbers of every unknown, in the order of the tables.
+    amounts: Vec<(Rates, Vec<u64>)>,
+    used: Vec<UsedRow>,
 }
 
 impl Solver<'_> {
@@ -175,88 +183,10 @@ impl Solver<'_> {
     /// A functional of the given observable degree as a short sum of derivatives of Z. `Err` is the reason
     /// why there is none to print.
     pub(crate) fn solve(&mut self, functional: &Functional, degree: usize) -> Result<Solved, Unsolved> {
-        let scatter = |values: &Vec<u64>| {
-            let mut row = vec![0; self.platform.names().len()];
-            for ((column, _), &value) in functional.terms.iter().zip(values) {
-                row[*column] = value;
-            }
-            row
-        };
-        let targets: Vec<Vec<u64>> = functional.images.iter().map(scatter).collect();
-        let first = self.tables.first();
-        let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
-        let allowed = self.tables.rows_up_to(degree);
-        // a functional that is a row is solved by this row
-        let support = match allowed.iter().find(|&&j| first.rows[j] == targets[0]) {
-            Some(&j) => vec![j],
-            None => short_support(first.sample.roots.field, &first.rows, &allowed, &targets[0], cost)
-                .ok_or(Unsolved::NotSpanned)?,
-        };
-        let columns = self.platform.names().len();
-        let solve = |problem: &LinearSystem| -> Option<Vec<(Rates, Vec<u64>)>> {
-            let tables = self.all_tables().zip(&targets);
-            let y =
-                tables.map(|((_, t), target)| problem.solve_in_field(&t.sample.roots.field, &t.rows, target));
-            self.split_rates(&y.collect::<Option<Vec<_>>>()?)
-        };
-        let mut problem = LinearSystem::solution(&support, columns, &[]);
-        let mut split = solve(&problem).ok_or(Unsolved::NoForm)?;
-        let motions = self.motions(&support, &split).ok_or(Unsolved::Motion)?;
-        if !motions.is_empty() {
-            problem = LinearSystem::solution(&support, columns, &motions);
-            split = solve(&problem).ok_or(Unsolved::NoForm)?;
-        }
-        let rows = support.iter().map(|&row| (row, [0, 0], 0));
-        // the motion enters (16) with w/wN
-        let moved = motions.iter().flat_map(|m| m.rows.iter().map(|&row| (row, [-1, 0], 1)));
-        let used: Vec<UsedRow> = (rows.chain(moved).zip(&split))
-            .map(|((row, by, turns), (r, _))| UsedRow { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
-            .collect();
-        let plan = self.plan(&used);
-        // numbers of the printed terms in every field
-        let numbers: Vec<Vec<u64>> = self
-            .all_tables()
-            .enumerate()
-            .map(|(s, (_, t))| {
-                let x: Vec<u64> = split.iter().map(|(_, numbers)| numbers[s]).collect();
-                self.term_numbers(&t.sample.point, &plan, &x)
-            })
-            .collect();
-        let of_term = |i: usize| -> Vec<u64> { numbers.iter().map(|v| v[i]).collect() };
-        let exact: Option<Vec<Number>> =
-            (0..plan.len()).map(|i| self.recover(&of_term(i)).map(Number::Radical)).collect();
-        let symbolic = match exact {
-            // nothing remains to be requested
-            Some(_) => None,
-            None => self.ask_for_solution(functional, &problem, &used, &plan),
-        };
-        let (numbers, found_by, verification) = match (symbolic, exact) {
-            (_, Some(exact)) => (exact, FoundBy::PrimeFields, Verification::Modular),
-            (Some(texts), None) => {
-                if !texts.iter().enumerate().all(|(i, t)| self.agrees(t, &of_term(i))) {
-                    return Err(Unsolved::Disagreement);
-                }
-                let longest = texts.iter().map(|t| self.symbols.display(t).len()).max().unwrap_or(0);
-                let limit = if self.floats.is_some() { READABLE } else { PRINTABLE };
-                if longest <= limit {
-                    let numbers = texts.into_iter().map(|t| self.text_number(t)).collect();
-                    (numbers, FoundBy::SymbolicEngine, Verification::Symbolic)
-                } else {
-                    let decimals = self.decimals(functional, &problem, &plan);
-                    let numbers = decimals.ok_or(Unsolved::TooLong { characters: longest })?;
-                    (numbers, FoundBy::FloatingPoint, Verification::Numeric)
-                }
-            }
-            (None, None) => {
-                let numbers = self.decimals(functional, &problem, &plan);
-                let missing = match &self.worker {
-                    None => Unsolved::NoEngine,
-                    Some(_) if self.too_many_angles() => Unsolved::TooManyAngles,
-                    Some(_) => Unsolved::NoFormula,
-                };
-                (numbers.ok_or(missing)?, FoundBy::FloatingPoint, Verification::Numeric)
-            }
-        };
+        let targets = self.targets(functional);
+        let system = self.row_system(&targets, degree)?;
+        let plan = self.plan(&system.used);
+        let (numbers, found_by, verification) = self.numbers(functional, &system, &plan)?;
         let mut terms: Vec<Term> = plan
             .iter()
             .zip(numbers)
@@ -278,6 +208,99 @@ impl Solver<'_> {
             term.coefficient = coefficient;
         }
         Ok(Solved { terms, found_by, verification })
+    }
+
+    /// Images of a functional as full rows, one per table.
+    fn targets(&self, functional: &Functional) -> Vec<Vec<u64>> {
+        let scatter = |values: &Vec<u64>| {
+            let mut row = vec![0; self.platform.names().len()];
+            for ((column, _), &value) in functional.terms.iter().zip(values) {
+                row[*column] = value;
+            }
+            row
+        };
+        functional.images.iter().map(scatter).collect()
+    }
+
+    /// Few rows up to the order `degree` that span the targets, with their amounts.
+    fn row_system(&self, targets: &[Vec<u64>], degree: usize) -> Result<RowSystem, Unsolved> {
+        let first = self.tables.first();
+        let cost = |j: usize| self.tables.observables[j % self.tables.observables.len()].solution.len();
+        let allowed = self.tables.rows_up_to(degree);
+        // a functional that is a row is solved by this row
+        let support = match allowed.iter().find(|&&j| first.rows[j] == targets[0]) {
+            Some(&j) => vec![j],
+            None => short_support(first.sample.roots.field, &first.rows, &allowed, &targets[0], cost)
+                .ok_or(Unsolved::NotSpanned)?,
+        };
+        let columns = self.platform.names().len();
+        let mut system = LinearSystem::solution(&support, columns, &[]);
+        let mut amounts = self.amounts(&system, targets).ok_or(Unsolved::NoForm)?;
+        let motions = self.motions(&support, &amounts).ok_or(Unsolved::Motion)?;
+        if !motions.is_empty() {
+            system = LinearSystem::solution(&support, columns, &motions);
+            amounts = self.amounts(&system, targets).ok_or(Unsolved::NoForm)?;
+        }
+        let rows = support.iter().map(|&row| (row, [0, 0], 0));
+        // the motion enters (16) with w/wN
+        let moved = motions.iter().flat_map(|m| m.rows.iter().map(|&row| (row, [-1, 0], 1)));
+        let used = (rows.chain(moved).zip(&amounts))
+            .map(|((row, by, turns), (r, _))| UsedRow { row, rates: [r[0] + by[0], r[1] + by[1]], turns })
+            .collect();
+        Ok(RowSystem { system, amounts, used })
+    }
+
+    /// Solution of a system in all tables: rates and numbers of each unknown; `None` if it has none of this
+    /// form.
+    fn amounts(&self, system: &LinearSystem, targets: &[Vec<u64>]) -> Option<Vec<(Rates, Vec<u64>)>> {
+        let tables = self.all_tables().zip(targets);
+        let y = tables.map(|((_, t), target)| system.solve_in_field(&t.sample.roots.field, &t.rows, target));
+        self.split_rates(&y.collect::<Option<Vec<_>>>()?)
+    }
+
+    /// Numbers of the printed terms: roots if possible, or formulas of the engine, or decimals.
+    fn numbers(
+        &mut self,
+        functional: &Functional,
+        RowSystem { system, amounts, used }: &RowSystem,
+        plan: &[(TermKey, Vec<Contribution>)],
+    ) -> Result<(Vec<Number>, FoundBy, Verification), Unsolved> {
+        // numbers of the printed terms in every field
+        let images: Vec<Vec<u64>> = self
+            .all_tables()
+            .enumerate()
+            .map(|(s, (_, t))| {
+                let x: Vec<u64> = amounts.iter().map(|(_, numbers)| numbers[s]).collect();
+                self.term_numbers(&t.sample.point, plan, &x)
+            })
+            .collect();
+        let of_term = |i: usize| -> Vec<u64> { images.iter().map(|v| v[i]).collect() };
+        let exact: Option<Vec<Number>> =
+            (0..plan.len()).map(|i| self.recover(&of_term(i)).map(Number::Radical)).collect();
+        if let Some(exact) = exact {
+            return Ok((exact, FoundBy::PrimeFields, Verification::Modular));
+        }
+        let Some(texts) = self.ask_for_solution(functional, system, used, plan) else {
+            let missing = match &self.worker {
+                None => Unsolved::NoEngine,
+                Some(_) if self.too_many_angles() => Unsolved::TooManyAngles,
+                Some(_) => Unsolved::NoFormula,
+            };
+            let numbers = self.decimals(functional, system, plan).ok_or(missing)?;
+            return Ok((numbers, FoundBy::FloatingPoint, Verification::Numeric));
+        };
+        if !texts.iter().enumerate().all(|(i, t)| self.agrees(t, &of_term(i))) {
+            return Err(Unsolved::Disagreement);
+        }
+        let longest = texts.iter().map(|t| self.symbols.display(t).len()).max().unwrap_or(0);
+        let limit = if self.floats.is_some() { READABLE } else { PRINTABLE };
+        if longest <= limit {
+            let numbers = texts.into_iter().map(|t| self.text_number(t)).collect();
+            return Ok((numbers, FoundBy::SymbolicEngine, Verification::Symbolic));
+        }
+        let decimals = self.decimals(functional, system, plan);
+        let numbers = decimals.ok_or(Unsolved::TooLong { characters: longest })?;
+        Ok((numbers, FoundBy::FloatingPoint, Verification::Numeric))
     }
 
     /// Motions of a solution by the rows `support` while the platform turns: one per rotation and rates of
@@ -319,8 +342,8 @@ impl Solver<'_> {
     }
 
     /// Printed terms of a solution that uses the rows `used`.
-    fn plan(&self, used: &[UsedRow]) -> Vec<(Key, Vec<Contribution>)> {
-        let mut plan: BTreeMap<Key, Vec<Contribution>> = BTreeMap::new();
+    fn plan(&self, used: &[UsedRow]) -> Vec<(TermKey, Vec<Contribution>)> {
+        let mut plan: BTreeMap<TermKey, Vec<Contribution>> = BTreeMap::new();
         for (j, u) in used.iter().enumerate() {
             let station = self.tables.station(u.row);
             let turns = self.stations[station].1.is_some();
@@ -330,7 +353,7 @@ impl Solver<'_> {
                 // Z^n = C_c^n Z^c, and C_c^n changes while the platform turns
                 for derivative in 0..=if in_platform && turns { z.order } else { 0 } {
                     for component in if in_platform { 1..=3 } else { z.component..=z.component } {
-                        let key = Key {
+                        let key = TermKey {
                             turns: u.turns + derivative,
                             order: z.order - derivative,
                             component,
@@ -355,7 +378,7 @@ impl Solver<'_> {
     fn term_numbers<R: Ring>(
         &self,
         point: &Point<R>,
-        plan: &[(Key, Vec<Contribution>)],
+        plan: &[(TermKey, Vec<Contribution>)],
         x: &[R::Element],
     ) -> Vec<R::Element> {
         let ring = &point.ring;
@@ -369,7 +392,7 @@ impl Solver<'_> {
     }
 
     /// Factor of the amount of a row in a printed term.
-    pub(super) fn weight<R: Ring>(&self, point: &Point<R>, key: &Key, c: &Contribution) -> R::Element {
+    pub(super) fn weight<R: Ring>(&self, point: &Point<R>, key: &TermKey, c: &Contribution) -> R::Element {
         let ring = &point.ring;
         let axis = match (self.frame, self.stations[key.station].1) {
             (Frame::Platform, Some(axis)) if !key.azimuth => {
@@ -389,7 +412,7 @@ impl Solver<'_> {
         &self,
         functional: &Functional,
         problem: &LinearSystem,
-        plan: &[(Key, Vec<Contribution>)],
+        plan: &[(TermKey, Vec<Contribution>)],
     ) -> Option<Vec<Number>> {
         let (point, rows) = self.floats.as_ref()?;
         let mut target = vec![0.0; self.platform.names().len()];
