@@ -170,85 +170,23 @@ impl<X: Manifold> Filter<X> {
         z: &[Option<f64>],
         how: &Update,
     ) -> Result<Innovation, EkfError> {
-        let (n, outputs) = (self.x.dimension(), m.outputs());
-        if z.len() != outputs {
-            return Err(EkfError::Shape { what: "z", expected: (outputs, 1), found: (z.len(), 1) });
-        }
-        let there: Vec<usize> = (0..outputs).filter(|&i| z[i].is_some()).collect();
-        let z: Vec<f64> = z.iter().copied().flatten().collect();
-        check_column("z", &z, z.len())?;
-        let r = m.noise(t);
-        check("R", &r, (outputs, outputs))?;
-        let whitener = Whitener::new(&r.select_rows(&there).select_columns(&there))?;
-        // residual of z at a state, and the derivative of h with respect to the coordinates about it
-        let seen = |x: &X| -> Result<(Vec<f64>, DMatrix<f64>), EkfError> {
-            let (h, jacobian) = (m.h(t, x), m.jacobian(t, x));
-            check_column("h", h.as_slice(), outputs)?;
-            check("H", &jacobian, (outputs, n))?;
-            let residual = there.iter().zip(&z).map(|(&i, z)| z - h[i]).collect();
-            Ok((whitener.apply(residual), whitener.rows(&jacobian.select_rows(&there))))
-        };
-        let (residual, rows) = seen(&self.x)?;
+        let seen = Present::new::<X>(m, t, z)?;
+        let (residual, rows) = seen.at(&self.x)?;
         let mut after = self.covariance.clone();
-        let mut whitened = Vec::with_capacity(there.len());
-        let mut delta = sequential(&mut after, &rows, &residual, &whitener.variances, |w| whitened.push(w))?;
+        let mut whitened = Vec::with_capacity(seen.there.len());
+        let mut delta =
+            sequential(&mut after, &rows, &residual, &seen.whitener.variances, |w| whitened.push(w))?;
         let mut out = Innovation { whitened, accepted: true, iterations: 1, converged: true };
         if let Some(probability) = how.gate
-            && !there.is_empty()
-            && out.nis() > chi_square_quantile(there.len() as f64, probability)
+            && !seen.there.is_empty()
+            && out.nis() > chi_square_quantile(seen.there.len() as f64, probability)
         {
             out.accepted = false;
             return Ok(out);
         }
         if how.iterations > 1 {
             out.converged = false;
-            let prior = Nees::of_covariance(&self.covariance)?;
-            let moved = |delta: &[f64]| {
-                let mut x = self.x.clone();
-                x.retract(delta);
-                x
-            };
-            // twice the negative logarithm of the probability of the state at `delta`
-            let cost = |delta: &[f64], residual: &[f64]| -> Result<f64, EkfError> {
-                let misfit = residual.iter().zip(&whitener.variances).map(|(e, r)| e * e / r).sum::<f64>();
-                Ok(prior.of(&mut delta.to_vec())? + misfit)
-            };
-            let mut before = vec![0.0; n];
-            let mut least = cost(&before, &residual)?;
-            while out.iterations < how.iterations {
-                let (mut x, (mut residual, mut rows));
-                let mut halvings = 0;
-                loop {
-                    x = moved(&delta);
-                    (residual, rows) = seen(&x)?;
-                    let found = cost(&delta, &residual)?;
-                    if found <= least * (1.0 + 1e-12) || halvings == HALVINGS {
-                        least = found;
-                        break;
-                    }
-                    delta.iter_mut().zip(&before).for_each(|(d, b)| *d = 0.5 * (*d + b));
-                    halvings += 1;
-                }
-                // the rows in the coordinates about the prediction, and the residual of z there
-                if let Some(transport) = self.x.transport(&delta) {
-                    rows *= transport.matrix();
-                }
-                let linear = &rows * DVector::from_column_slice(&delta);
-                residual.iter_mut().zip(linear.iter()).for_each(|(e, l)| *e += l);
-                after = self.covariance.clone();
-                let next = sequential(&mut after, &rows, &residual, &whitener.variances, |_| {})?;
-                out.iterations += 1;
-                let sigmas = after.sigmas();
-                out.converged = next
-                    .iter()
-                    .zip(&delta)
-                    .zip(&sigmas)
-                    .all(|((a, b), s)| (a - b).abs() <= how.tolerance * s);
-                before = std::mem::replace(&mut delta, next);
-                if out.converged {
-                    break;
-                }
-            }
+            after = self.iterate(&seen, &residual, &mut delta, how, &mut out)?;
         }
         if let Some(transport) = self.x.transport(&delta) {
             after.propagate(&transport, &ProcessNoise::none())?;
@@ -258,6 +196,128 @@ impl<X: Manifold> Filter<X> {
         check_state("x", &x)?;
         (self.x, self.covariance) = (x, after);
         Ok(out)
+    }
+
+    /// Linearises again at the end of the step `delta` until it changes no more; `residual` is that of the
+    /// prediction. Returns the covariance of the last step.
+    fn iterate<M: Measurement<X>>(
+        &self,
+        seen: &Present<'_, M>,
+        residual: &[f64],
+        delta: &mut Vec<f64>,
+        how: &Update,
+        out: &mut Innovation,
+    ) -> Result<Covariance, EkfError> {
+        let posterior =
+            Posterior { prediction: &self.x, prior: Nees::of_covariance(&self.covariance)?, seen };
+        let mut after = self.covariance.clone();
+        let mut before = vec![0.0; self.x.dimension()];
+        let mut least = posterior.cost(&before, residual)?;
+        while out.iterations < how.iterations {
+            let (mut residual, mut rows) = posterior.damp(delta, &before, &mut least)?;
+            // the rows in the coordinates about the prediction, and the residual of z there
+            if let Some(transport) = self.x.transport(delta) {
+                rows *= transport.matrix();
+            }
+            let linear = &rows * DVector::from_column_slice(delta);
+            residual.iter_mut().zip(linear.iter()).for_each(|(e, l)| *e += l);
+            after = self.covariance.clone();
+            let next = sequential(&mut after, &rows, &residual, &seen.whitener.variances, |_| {})?;
+            out.iterations += 1;
+            let sigmas = after.sigmas();
+            out.converged =
+                next.iter().zip(&*delta).zip(&sigmas).all(|((a, b), s)| (a - b).abs() <= how.tolerance * s);
+            before = std::mem::replace(delta, next);
+            if out.converged {
+                break;
+            }
+        }
+        Ok(after)
+    }
+}
+
+/// Components of a measurement that are present, made independent.
+struct Present<'a, M> {
+    m: &'a M,
+    t: f64,
+    /// Numbers of the components.
+    there: Vec<usize>,
+    z: Vec<f64>,
+    whitener: Whitener,
+}
+
+impl<'a, M> Present<'a, M> {
+    /// Components of `z` (shape m) at `t` that are present.
+    ///
+    /// # Errors
+    /// [`EkfError`] for a wrong shape, a number that is not finite, or an R that is not positive definite.
+    fn new<X: Manifold>(m: &'a M, t: f64, z: &[Option<f64>]) -> Result<Self, EkfError>
+    where
+        M: Measurement<X>,
+    {
+        let outputs = m.outputs();
+        if z.len() != outputs {
+            return Err(EkfError::Shape { what: "z", expected: (outputs, 1), found: (z.len(), 1) });
+        }
+        let there: Vec<usize> = (0..outputs).filter(|&i| z[i].is_some()).collect();
+        let z: Vec<f64> = z.iter().copied().flatten().collect();
+        check_column("z", &z, z.len())?;
+        let r = m.noise(t);
+        check("R", &r, (outputs, outputs))?;
+        let whitener = Whitener::new(&r.select_rows(&there).select_columns(&there))?;
+        Ok(Self { m, t, there, z, whitener })
+    }
+
+    /// Residual of z at a state, and the derivative of h with respect to the coordinates about it.
+    fn at<X: Manifold>(&self, x: &X) -> Result<(Vec<f64>, DMatrix<f64>), EkfError>
+    where
+        M: Measurement<X>,
+    {
+        let outputs = self.m.outputs();
+        let (h, jacobian) = (self.m.h(self.t, x), self.m.jacobian(self.t, x));
+        check_column("h", h.as_slice(), outputs)?;
+        check("H", &jacobian, (outputs, x.dimension()))?;
+        let residual = self.there.iter().zip(&self.z).map(|(&i, z)| z - h[i]).collect();
+        Ok((self.whitener.apply(residual), self.whitener.rows(&jacobian.select_rows(&self.there))))
+    }
+}
+
+/// Probability of states about a prediction, given a measurement.
+struct Posterior<'a, X, M> {
+    prediction: &'a X,
+    prior: Nees,
+    seen: &'a Present<'a, M>,
+}
+
+impl<X: Manifold, M: Measurement<X>> Posterior<'_, X, M> {
+    /// Twice the negative logarithm of the probability of the state at `delta`, up to a constant.
+    fn cost(&self, delta: &[f64], residual: &[f64]) -> Result<f64, EkfError> {
+        let variances = &self.seen.whitener.variances;
+        let misfit = residual.iter().zip(variances).map(|(e, r)| e * e / r).sum::<f64>();
+        Ok(self.prior.of(&mut delta.to_vec())? + misfit)
+    }
+
+    /// Halves the step from `before` to `delta` as long as it makes the state less probable than `least`.
+    /// Returns the residual and the derivative of h at its end.
+    fn damp(
+        &self,
+        delta: &mut [f64],
+        before: &[f64],
+        least: &mut f64,
+    ) -> Result<(Vec<f64>, DMatrix<f64>), EkfError> {
+        let mut halvings = 0;
+        loop {
+            let mut x = self.prediction.clone();
+            x.retract(delta);
+            let (residual, rows) = self.seen.at(&x)?;
+            let found = self.cost(delta, &residual)?;
+            if found <= *least * (1.0 + 1e-12) || halvings == HALVINGS {
+                *least = found;
+                return Ok((residual, rows));
+            }
+            delta.iter_mut().zip(before).for_each(|(d, b)| *d = 0.5 * (*d + b));
+            halvings += 1;
+        }
     }
 }
 
