@@ -1,7 +1,7 @@
 //! Dependencies among the columns of a dense matrix over the field.
 
 use crate::Field;
-use crate::groebner::{OverLimit, Work};
+use crate::groebner::{OverLimit, RemainingWork};
 
 /// Row echelon form of a matrix, columns from left to right: every column is a pivot or depends on pivots
 /// before it.
@@ -23,7 +23,7 @@ impl ColumnEchelon {
         f: &Field,
         columns: usize,
         mut rows: Vec<Vec<u64>>,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Self, OverLimit> {
         let (mut pivots, mut free) = (Vec::new(), Vec::new());
         for column in 0..columns {
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ENOUGH: Work = Work::new(1_000_000);
+    const ENOUGH: RemainingWork = RemainingWork::new(1_000_000);
 
     proptest! {
         /// Dependent columns are found, with the coefficients that they were made with.
@@ -112,6 +112,6 @@ mod tests {
     fn work_is_limited() {
         let f = Field::new((1 << 60) + 33);
         let rows = vec![vec![f.one(); 4]; 4];
-        assert!(ColumnEchelon::new(&f, 4, rows, &mut Work::new(3)).is_err());
+        assert!(ColumnEchelon::new(&f, 4, rows, &mut RemainingWork::new(3)).is_err());
     }
 }

@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-use crate::groebner::{OverLimit, Work};
+use crate::groebner::{OverLimit, RemainingWork};
 use crate::multivariate::{Monomial, Polynomial};
 use crate::{Field, SplitMix64, polynomial};
 
@@ -28,7 +28,7 @@ pub struct Algebra {
     /// Generator of its random points.
     pub rng: SplitMix64,
     /// Remaining work.
-    pub work: Work,
+    pub work: RemainingWork,
 }
 
 /// Work of `terms` terms that are made or copied.
@@ -50,6 +50,14 @@ impl PartialOrd for Lex {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
+}
+
+/// Values `(x, c(x))` of the coefficients of a polynomial at points of a variable.
+type PointValues = BTreeMap<Lex, Vec<(u64, u64)>>;
+
+/// Leading coefficient.
+fn top(parts: &BTreeMap<Lex, Vec<u64>>) -> Vec<u64> {
+    parts.values().next_back().cloned().unwrap_or_default()
 }
 
 /// Lexicographic order of monomials, the first variable greatest; products preserve it.
@@ -327,42 +335,14 @@ impl Algebra {
         let dense = x.saturating_add(y);
         let mut content = Vec::new();
         for (parts, degree) in [(&mut a, degrees[0]), (&mut b, degrees[1])] {
-            let mut own = Vec::new();
-            for c in parts.values() {
-                self.work.take((c.len() as u64).saturating_mul(degree.saturating_mul(2)))?;
-                own = polynomial::gcd(&f, own, c.clone());
-            }
-            for c in parts.values_mut() {
-                *c = polynomial::quotient(&f, c, &own);
-            }
+            let own = self.divide_by_content(parts, degree)?;
             content = polynomial::gcd(&f, content, own);
         }
-        let top = |parts: &BTreeMap<Lex, Vec<u64>>| parts.values().next_back().cloned().unwrap_or_default();
         let scale = polynomial::gcd(&f, top(&a), top(&b));
         let points = bound + scale.len();
         let terms = TERM * (a.len() + b.len()) as u64;
-        let mut values: BTreeMap<Lex, Vec<(u64, u64)>> = BTreeMap::new();
-        let mut at = Vec::new();
-        while at.len() < points {
-            self.work.take(dense.saturating_add(terms))?;
-            let x = self.number();
-            let leads = [top(&a), top(&b)].map(|c| polynomial::value(&f, &c, x));
-            if leads.contains(&0) || at.contains(&x) {
-                continue;
-            }
-            let [p, q] = [&a, &b].map(|parts| {
-                let mut out = Polynomial::default();
-                parts.iter().for_each(|(m, c)| out.put(&f, m.0.clone(), polynomial::value(&f, c, x)));
-                out
-            });
-            let image = self.interpolated(&p, &q, others)?;
-            let factor = f.mul(polynomial::value(&f, &scale, x), f.inv(self.leading(&image)));
-            for (m, c) in image.terms() {
-                let list = values.entry(Lex(m.clone())).or_default();
-                list.push((x, f.mul(c, factor)));
-            }
-            at.push(x);
-        }
+        let each = dense.saturating_add(terms);
+        let (at, values) = self.images([&a, &b], &scale, (points, each), others)?;
         let mut parts = BTreeMap::new();
         let mut own = Vec::new();
         for (m, mut list) in values {
@@ -379,6 +359,59 @@ impl Algebra {
             *c = polynomial::multiply(&f, &polynomial::quotient(&f, c, &own), &content);
         }
         Ok(self.monic(&joined(&f, &parts, v)))
+    }
+
+    /// Divides dense coefficients of this degree by their greatest common divisor, and returns it.
+    fn divide_by_content(
+        &mut self,
+        parts: &mut BTreeMap<Lex, Vec<u64>>,
+        degree: u64,
+    ) -> Result<Vec<u64>, OverLimit> {
+        let f = self.f;
+        let mut own = Vec::new();
+        for c in parts.values() {
+            self.work.take((c.len() as u64).saturating_mul(degree.saturating_mul(2)))?;
+            own = polynomial::gcd(&f, own, c.clone());
+        }
+        for c in parts.values_mut() {
+            *c = polynomial::quotient(&f, c, &own);
+        }
+        Ok(own)
+    }
+
+    /// Greatest common divisors at as many `points` of a variable, each for `work` products, with the leading
+    /// coefficient `scale`: the points, and the values of each coefficient at those where it is not zero.
+    fn images(
+        &mut self,
+        both: [&BTreeMap<Lex, Vec<u64>>; 2],
+        scale: &[u64],
+        (points, work): (usize, u64),
+        others: &[(u32, usize)],
+    ) -> Result<(Vec<u64>, PointValues), OverLimit> {
+        let f = self.f;
+        let mut values = PointValues::new();
+        let mut at = Vec::new();
+        while at.len() < points {
+            self.work.take(work)?;
+            let x = self.number();
+            let leads = both.map(|parts| polynomial::value(&f, &top(parts), x));
+            if leads.contains(&0) || at.contains(&x) {
+                continue;
+            }
+            let [p, q] = both.map(|parts| {
+                let mut out = Polynomial::default();
+                parts.iter().for_each(|(m, c)| out.put(&f, m.0.clone(), polynomial::value(&f, c, x)));
+                out
+            });
+            let image = self.interpolated(&p, &q, others)?;
+            let factor = f.mul(polynomial::value(&f, scale, x), f.inv(self.leading(&image)));
+            for (m, c) in image.terms() {
+                let list = values.entry(Lex(m.clone())).or_default();
+                list.push((x, f.mul(c, factor)));
+            }
+            at.push(x);
+        }
+        Ok((at, values))
     }
 
     /// Factors with their powers, as found from single variables, contents along a variable and
@@ -464,7 +497,7 @@ mod tests {
     const P: u64 = (1 << 60) + 33;
 
     fn algebra(seed: u64) -> Algebra {
-        Algebra { f: Field::new(P), rng: SplitMix64::new(seed), work: Work::new(1 << 32) }
+        Algebra { f: Field::new(P), rng: SplitMix64::new(seed), work: RemainingWork::new(1 << 32) }
     }
 
     /// Random polynomial of a few small terms.

@@ -188,7 +188,7 @@ impl Algebra {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::groebner::Work;
+    use crate::groebner::RemainingWork;
     use crate::{Field, SplitMix64};
 
     /// Random expressions: each result has the value of the operations on numbers, and is in lowest
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn fractions_are_their_values() {
         let f = Field::new((1 << 60) + 33);
-        let mut s = Algebra { f, rng: SplitMix64::new(3), work: Work::new(1 << 32) };
+        let mut s = Algebra { f, rng: SplitMix64::new(3), work: RemainingWork::new(1 << 32) };
         let mut rng = SplitMix64::new(7);
         for _ in 0..60 {
             let point: Vec<u64> = (0..4).map(|_| f.from_u64(rng.next_u64())).collect();

@@ -11,7 +11,7 @@ use crate::{Field, SplitMix64, interrupt};
 
 /// Limit of work in products of coefficients, counted down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Work {
+pub struct RemainingWork {
     /// Remaining work.
     pub left: u64,
     /// True once the limit was reached. Otherwise [`OverLimit`] is a power above 255, which no limit
@@ -23,7 +23,7 @@ pub struct Work {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OverLimit;
 
-impl Work {
+impl RemainingWork {
     /// Limit of `left` products.
     pub const fn new(left: u64) -> Self {
         Self { left, used_up: false }
@@ -44,7 +44,7 @@ impl Work {
 
 /// Monomials by number; equal monomials have the same number.
 #[derive(Debug, Clone)]
-struct Table {
+struct MonomialTable {
     weights: Vec<u32>,
     exponents: Vec<u8>,
     degree: Vec<u32>,
@@ -60,7 +60,7 @@ struct Table {
 /// Empty slot of the hash table.
 const EMPTY: u32 = u32::MAX;
 
-impl Table {
+impl MonomialTable {
     fn new(weights: &[u32]) -> Self {
         let mut rng = SplitMix64::new(0);
         Self {
@@ -173,6 +173,101 @@ impl Table {
 /// Terms from the leading one on, which has coefficient one in a basis.
 type Row = Vec<(u32, u64)>;
 
+/// Terms as entries of a matrix: column and coefficient.
+type MatrixRow = Vec<(usize, u64)>;
+
+/// MonomialColumns of a matrix: monomials, each once.
+#[derive(Default)]
+struct MonomialColumns {
+    /// Column of every monomial; `usize::MAX` for one that does not occur.
+    place: Vec<usize>,
+    monomials: Vec<u32>,
+}
+
+impl MonomialColumns {
+    /// Adds the monomials of a row.
+    fn enter(&mut self, row: &Row) {
+        for &(m, _) in row {
+            if self.place.len() <= m as usize {
+                self.place.resize(m as usize + 1, usize::MAX);
+            }
+            if self.place[m as usize] == usize::MAX {
+                self.place[m as usize] = 0;
+                self.monomials.push(m);
+            }
+        }
+    }
+
+    /// Orders the columns: the largest monomial first.
+    fn sort(&mut self, table: &MonomialTable) {
+        self.monomials.sort_unstable_by(|a, b| table.compare(*b, *a));
+        for (c, &m) in self.monomials.iter().enumerate() {
+            self.place[m as usize] = c;
+        }
+    }
+
+    fn placed(&self, row: Row) -> MatrixRow {
+        row.into_iter().map(|(m, c)| (self.place[m as usize], c)).collect()
+    }
+}
+
+/// MacaulayMatrix in row echelon form.
+struct MacaulayMatrix {
+    field: Field,
+    /// Row of every pivot column.
+    pivots: Vec<Option<MatrixRow>>,
+    /// Row that is being reduced; zero between two rows.
+    dense: Vec<u64>,
+}
+
+impl MacaulayMatrix {
+    fn new(field: Field, columns: usize) -> Self {
+        Self { field, pivots: vec![None; columns], dense: vec![0; columns] }
+    }
+
+    /// Reduces a row and adds the rest, `monic` or not; returns its pivot, `None` if nothing remains.
+    fn reduce(
+        &mut self,
+        row: &MatrixRow,
+        monic: bool,
+        work: &mut RemainingWork,
+    ) -> Result<Option<usize>, OverLimit> {
+        let Self { field: f, pivots, dense } = self;
+        let columns = dense.len();
+        let start = row[0].0;
+        for &(c, x) in row {
+            dense[c] = x;
+        }
+        let mut lead = None;
+        work.take(columns as u64 / 8)?;
+        for c in start..columns {
+            let x = dense[c];
+            if x == 0 {
+                continue;
+            }
+            match &pivots[c] {
+                Some(pivot) => {
+                    work.take(pivot.len() as u64)?;
+                    let minus = f.neg(x);
+                    for &(d, y) in pivot {
+                        dense[d] = f.add(dense[d], f.mul(minus, y));
+                    }
+                }
+                None => lead = lead.or(Some(c)),
+            }
+        }
+        let Some(lead) = lead else { return Ok(None) };
+        let inverse = if monic { f.inv(dense[lead]) } else { f.one() };
+        let mut kept = Vec::new();
+        for (c, x) in dense.iter_mut().enumerate().skip(lead).filter(|x| *x.1 != 0) {
+            kept.push((c, f.mul(*x, inverse)));
+            *x = 0;
+        }
+        pivots[lead] = Some(kept);
+        Ok(Some(lead))
+    }
+}
+
 struct Pair {
     lcm: u32,
     i: usize,
@@ -181,9 +276,9 @@ struct Pair {
 
 /// Groebner basis, or the part of it that was found.
 #[derive(Debug, Clone)]
-pub struct Basis {
+pub struct GroebnerBasis {
     field: Field,
-    table: Table,
+    table: MonomialTable,
     rows: Vec<Row>,
     /// True, by row, if no other leading monomial divides that of the row.
     active: Vec<bool>,
@@ -191,14 +286,14 @@ pub struct Basis {
     complete: bool,
 }
 
-impl Basis {
+impl GroebnerBasis {
     /// The Groebner basis of the ideal of `input`, with one variable per entry of `weights`. If `work`
     /// is not sufficient the basis is not [complete](Self::is_complete), but all its elements are in
     /// the ideal.
-    pub fn new(f: &Field, weights: &[u32], input: &[Polynomial], work: &mut Work) -> Self {
+    pub fn new(f: &Field, weights: &[u32], input: &[Polynomial], work: &mut RemainingWork) -> Self {
         let mut out = Self {
             field: *f,
-            table: Table::new(weights),
+            table: MonomialTable::new(weights),
             rows: Vec::new(),
             active: Vec::new(),
             complete: false,
@@ -233,7 +328,7 @@ impl Basis {
         Ok(row)
     }
 
-    fn close(&mut self, input: &[Polynomial], work: &mut Work) -> Result<(), OverLimit> {
+    fn close(&mut self, input: &[Polynomial], work: &mut RemainingWork) -> Result<(), OverLimit> {
         let mut pairs: Vec<Pair> = Vec::new();
         let rows = input.iter().map(|p| self.row(p)).collect::<Result<Vec<_>, _>>()?;
         let mut new = self.reduced(rows, true, work)?;
@@ -262,7 +357,7 @@ impl Basis {
     }
 
     /// The multiple of element i whose leading monomial is m.
-    fn multiple(&mut self, i: usize, m: u32, work: &mut Work) -> Result<Row, OverLimit> {
+    fn multiple(&mut self, i: usize, m: u32, work: &mut RemainingWork) -> Result<Row, OverLimit> {
         let factor = self.table.quotient(m, self.rows[i][0].0)?;
         work.take(8 * self.rows[i].len() as u64)?;
         (0..self.rows[i].len())
@@ -279,96 +374,50 @@ impl Basis {
 
     /// Remainders of the rows, reduced by the basis and by each other: rows with different leading
     /// monomials that are no multiples of those of the basis.
-    fn reduced(&mut self, rows: Vec<Row>, monic: bool, work: &mut Work) -> Result<Vec<Row>, OverLimit> {
+    fn reduced(
+        &mut self,
+        rows: Vec<Row>,
+        monic: bool,
+        work: &mut RemainingWork,
+    ) -> Result<Vec<Row>, OverLimit> {
         // every monomial that may occur, with the row that removes it
-        let mut place: Vec<usize> = Vec::new();
-        let mut monomials: Vec<u32> = Vec::new();
+        let mut columns = MonomialColumns::default();
         let mut removers: Vec<Row> = Vec::new();
-        let enter = |row: &Row, place: &mut Vec<usize>, monomials: &mut Vec<u32>| {
-            for &(m, _) in row {
-                if place.len() <= m as usize {
-                    place.resize(m as usize + 1, usize::MAX);
-                }
-                if place[m as usize] == usize::MAX {
-                    place[m as usize] = 0;
-                    monomials.push(m);
-                }
-            }
-        };
         for row in &rows {
-            enter(row, &mut place, &mut monomials);
+            columns.enter(row);
         }
         let mut next = 0;
-        while next < monomials.len() {
-            let m = monomials[next];
+        while next < columns.monomials.len() {
+            let m = columns.monomials[next];
             next += 1;
             work.take(self.active.len() as u64 / 4 + 1)?;
             if let Some(i) = self.reducer(m) {
                 let row = self.multiple(i, m, work)?;
-                enter(&row, &mut place, &mut monomials);
+                columns.enter(&row);
                 removers.push(row);
             }
         }
-        let columns = monomials.len();
-        monomials.sort_unstable_by(|a, b| self.table.compare(*b, *a));
-        for (c, &m) in monomials.iter().enumerate() {
-            place[m as usize] = c;
-        }
-        let placed = |row: Row| -> Vec<(usize, u64)> {
-            row.into_iter().map(|(m, c)| (place[m as usize], c)).collect()
-        };
-        let mut pivots: Vec<Option<Vec<(usize, u64)>>> = vec![None; columns];
+        columns.sort(&self.table);
+        let mut matrix = MacaulayMatrix::new(self.field, columns.monomials.len());
         for row in removers {
-            let row = placed(row);
+            let row = columns.placed(row);
             let lead = row[0].0;
-            pivots[lead] = Some(row);
+            matrix.pivots[lead] = Some(row);
         }
-        let f = self.field;
-        let mut rows: Vec<Vec<(usize, u64)>> =
-            rows.into_iter().map(placed).filter(|r| !r.is_empty()).collect();
+        let mut rows: Vec<MatrixRow> =
+            rows.into_iter().map(|row| columns.placed(row)).filter(|r| !r.is_empty()).collect();
         // short rows first
         rows.sort_by_key(|r| (r.len(), std::cmp::Reverse(r[0].0)));
-        let mut dense = vec![0u64; columns];
         let mut found = Vec::new();
         for row in rows {
-            let start = row[0].0;
-            for &(c, x) in &row {
-                dense[c] = x;
-            }
-            let mut lead = None;
-            work.take(columns as u64 / 8)?;
-            for c in start..columns {
-                let x = dense[c];
-                if x == 0 {
-                    continue;
-                }
-                match &pivots[c] {
-                    Some(pivot) => {
-                        work.take(pivot.len() as u64)?;
-                        let minus = f.neg(x);
-                        for &(d, y) in pivot {
-                            dense[d] = f.add(dense[d], f.mul(minus, y));
-                        }
-                    }
-                    None => lead = lead.or(Some(c)),
-                }
-            }
-            let Some(lead) = lead else { continue };
-            let inverse = if monic { f.inv(dense[lead]) } else { f.one() };
-            let mut kept = Vec::new();
-            for (c, x) in dense.iter_mut().enumerate().skip(lead).filter(|x| *x.1 != 0) {
-                kept.push((c, f.mul(*x, inverse)));
-                *x = 0;
-            }
-            pivots[lead] = Some(kept);
-            found.push(lead);
+            found.extend(matrix.reduce(&row, monic, work)?);
         }
-        let out = found.into_iter().filter_map(|lead| pivots[lead].take());
-        Ok(out.map(|row| row.into_iter().map(|(c, x)| (monomials[c], x)).collect()).collect())
+        let out = found.into_iter().filter_map(|lead| matrix.pivots[lead].take());
+        Ok(out.map(|row| row.into_iter().map(|(c, x)| (columns.monomials[c], x)).collect()).collect())
     }
 
     /// Adds an element, with its pairs by the criteria of Gebauer and Möller.
-    fn insert(&mut self, row: Row, pairs: &mut Vec<Pair>, work: &mut Work) -> Result<(), OverLimit> {
+    fn insert(&mut self, row: Row, pairs: &mut Vec<Pair>, work: &mut RemainingWork) -> Result<(), OverLimit> {
         let (h, lead) = (self.rows.len(), row[0].0);
         let active: Vec<usize> = (0..h).filter(|&i| self.active[i]).collect();
         work.take(8 * (active.len() + pairs.len()) as u64)?;
@@ -408,7 +457,7 @@ impl Basis {
     ///
     /// # Errors
     /// [`OverLimit`].
-    pub fn remainder(&mut self, p: &Polynomial, work: &mut Work) -> Result<Polynomial, OverLimit> {
+    pub fn remainder(&mut self, p: &Polynomial, work: &mut RemainingWork) -> Result<Polynomial, OverLimit> {
         let row = self.row(p)?;
         let rest = self.reduced(vec![row], false, work)?;
         Ok(rest.first().map_or_else(Polynomial::default, |r| self.polynomial(r)))
@@ -459,7 +508,7 @@ impl Basis {
         &mut self,
         element: &Polynomial,
         most: usize,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let f = self.field;
         let mut power = self.remainder(&Polynomial::constant(f.one()), work)?;
@@ -499,7 +548,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ENOUGH: Work = Work::new(50_000_000);
+    const ENOUGH: RemainingWork = RemainingWork::new(50_000_000);
 
     fn field() -> Field {
         Field::new((1 << 60) + 33)
@@ -559,7 +608,7 @@ mod tests {
     }
 
     /// True if Buchberger's criterion holds and the ideal contains the input; by division only.
-    fn is_basis_of(basis: &Basis, input: &[Polynomial], weights: &[u32]) -> bool {
+    fn is_basis_of(basis: &GroebnerBasis, input: &[Polynomial], weights: &[u32]) -> bool {
         let f = field();
         let elements = basis.elements();
         let closed = elements.iter().enumerate().all(|(i, a)| {
@@ -587,7 +636,7 @@ mod tests {
             weights in prop::collection::vec(1u32..4, 3),
         ) {
             let input: Vec<Polynomial> = input.iter().map(|p| polynomial(p)).collect();
-            let basis = Basis::new(&field(), &weights, &input, &mut ENOUGH.clone());
+            let basis = GroebnerBasis::new(&field(), &weights, &input, &mut ENOUGH.clone());
             prop_assert!(basis.is_complete());
             prop_assert!(is_basis_of(&basis, &input, &weights));
         }
@@ -607,7 +656,7 @@ mod tests {
             let y = polynomial(&[(a, vec![2, 0, 0]), (1, vec![0, 0, 0]), (-1, vec![0, 1, 0])]);
             let z = polynomial(&[(b, vec![0, 0, 1]), (-1, vec![1, 1, 0])]);
             let input = [product, y, z];
-            let mut basis = Basis::new(&f, &[1, 1, 1], &input, &mut ENOUGH.clone());
+            let mut basis = GroebnerBasis::new(&f, &[1, 1, 1], &input, &mut ENOUGH.clone());
             prop_assert!(is_basis_of(&basis, &input, &[1, 1, 1]));
             prop_assert_eq!(basis.dimension(50), Ok(Some(xs.len())));
             let mut values = |v: u32| {
@@ -635,7 +684,7 @@ mod tests {
             polynomial(&[(1, vec![2, 0]), (5, vec![0, 1])]),
             polynomial(&[(1, vec![1, 1]), (-1, vec![0, 0])]),
         ];
-        let mut basis = Basis::new(&f, &[1, 1], &input, &mut ENOUGH.clone());
+        let mut basis = GroebnerBasis::new(&f, &[1, 1], &input, &mut ENOUGH.clone());
         assert!(is_basis_of(&basis, &input, &[1, 1]));
         let x = Polynomial::variable(&f, 0);
         let cube = basis.minimal_polynomial(&x, 5, &mut ENOUGH.clone()).expect("work").expect("finite");
@@ -643,8 +692,8 @@ mod tests {
         assert_eq!(basis.dimension(2), Ok(None));
         // no solution, and infinitely many
         let none = [input[1].clone(), x.clone()];
-        assert_eq!(Basis::new(&f, &[1, 1], &none, &mut ENOUGH.clone()).dimension(5), Ok(Some(0)));
-        assert_eq!(Basis::new(&f, &[1, 1], &input[..1], &mut ENOUGH.clone()).dimension(5), Ok(None));
+        assert_eq!(GroebnerBasis::new(&f, &[1, 1], &none, &mut ENOUGH.clone()).dimension(5), Ok(Some(0)));
+        assert_eq!(GroebnerBasis::new(&f, &[1, 1], &input[..1], &mut ENOUGH.clone()).dimension(5), Ok(None));
     }
 
     /// Katsura's fourth system has sixteen solutions; with too little work no false statement results.
@@ -674,13 +723,13 @@ mod tests {
         }
         input.push(sum);
         let mut work = ENOUGH;
-        let mut basis = Basis::new(&f, &[1; 5], &input, &mut work);
+        let mut basis = GroebnerBasis::new(&f, &[1; 5], &input, &mut work);
         assert_eq!(basis.dimension(100), Ok(Some(16)));
         assert!(is_basis_of(&basis, &input, &[1; 5]));
         let needed = ENOUGH.left - work.left;
         assert!(!work.used_up);
-        let mut short = Work::new(needed / 2);
-        let part = Basis::new(&f, &[1; 5], &input, &mut short);
+        let mut short = RemainingWork::new(needed / 2);
+        let part = GroebnerBasis::new(&f, &[1; 5], &input, &mut short);
         assert!(!part.is_complete() && short.used_up);
         // all elements found are in the ideal
         assert!(part.elements().iter().all(|p| divided(p.clone(), &basis.elements(), &[1; 5]).is_empty()));

@@ -241,13 +241,18 @@ impl Expression {
 /// [`ExpressionError::UnknownName`] and [`ExpressionError::DivisionByZero`], [`ExpressionError::Syntax`] for
 /// other functions and exponents.
 pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Result<u64, ExpressionError> {
-    let syntax = |i: usize, expected| ExpressionError::Syntax {
-        expected,
-        found: "something else".into(),
-        span: expression.spans[i].clone(),
-    };
-    let mut values: Vec<u64> = Vec::with_capacity(expression.nodes.len());
-    // a name of an angle and an exponent need no value
+    let is_argument = angle_arguments(expression);
+    let mut evaluation =
+        FieldEvaluation { expression, f, env, values: Vec::with_capacity(expression.nodes.len()) };
+    for (i, &is_argument) in is_argument.iter().enumerate() {
+        let value = if is_argument { evaluation.argument(i)? } else { evaluation.node(i)? };
+        evaluation.values.push(value);
+    }
+    Ok(evaluation.values.last().copied().unwrap_or(0))
+}
+
+/// True, per node, if it is the argument of a function or its negative.
+fn angle_arguments(expression: &Expression) -> Vec<bool> {
     let mut arguments = vec![false; expression.nodes.len()];
     for (i, node) in expression.nodes.iter().enumerate().rev() {
         match node {
@@ -256,79 +261,103 @@ pub fn evaluate(expression: &Expression, f: &Field, env: &dyn Environment) -> Re
             _ => (),
         }
     }
-    for (i, node) in expression.nodes.iter().enumerate() {
-        let span = || expression.spans[i].clone();
-        let unknown = |name: &str| ExpressionError::UnknownName {
+    arguments
+}
+
+/// FieldEvaluation of an expression in a field, with the values of the nodes so far.
+struct FieldEvaluation<'a> {
+    expression: &'a Expression,
+    f: &'a Field,
+    env: &'a dyn Environment,
+    values: Vec<u64>,
+}
+
+impl FieldEvaluation<'_> {
+    fn syntax(&self, i: usize, expected: &'static str, found: String) -> ExpressionError {
+        ExpressionError::Syntax { expected, found, span: self.expression.spans[i].clone() }
+    }
+
+    fn unknown(&self, i: usize, name: &str) -> ExpressionError {
+        ExpressionError::UnknownName {
             name: name.into(),
-            hint: among(name, &env.known()),
-            span: span(),
-        };
-        let inverse = |a: u64| match a {
-            0 => Err(ExpressionError::DivisionByZero { span: span() }),
-            _ => Ok(f.inv(a)),
-        };
-        let value = match node {
+            hint: among(name, &self.env.known()),
+            span: self.expression.spans[i].clone(),
+        }
+    }
+
+    /// Inverse of a value in node i.
+    fn inverse(&self, i: usize, a: u64) -> Result<u64, ExpressionError> {
+        match a {
+            0 => Err(ExpressionError::DivisionByZero { span: self.expression.spans[i].clone() }),
+            _ => Ok(self.f.inv(a)),
+        }
+    }
+
+    /// Value of a node that is an argument: the name of an angle needs none.
+    fn argument(&self, i: usize) -> Result<u64, ExpressionError> {
+        match self.expression.nodes[i] {
+            Node::Name(_) => Ok(0),
+            _ => self.node(i),
+        }
+    }
+
+    fn node(&self, i: usize) -> Result<u64, ExpressionError> {
+        let (f, values) = (self.f, &self.values);
+        Ok(match &self.expression.nodes[i] {
             Node::Number { mantissa, decimals } => {
                 let ten = f.pow(f.from_u64(10), decimals.unsigned_abs().into());
                 f.mul(from_i128(f, *mantissa), if *decimals < 0 { ten } else { f.inv(ten) })
             }
-            Node::Name(_) if arguments[i] => 0,
             Node::Name(name) if name.ends_with(" deg") => {
-                return Err(ExpressionError::Syntax {
-                    expected: "angles in sin or cos only",
-                    found: format!("`{name}`"),
-                    span: span(),
-                });
+                return Err(self.syntax(i, "angles in sin or cos only", format!("`{name}`")));
             }
-            Node::Name(name) => env.name(name).ok_or_else(|| unknown(name))?,
-            Node::Call { function, argument } => {
-                let angle = || {
-                    let Some((angle, minus)) = expression.angle_at(*argument) else {
-                        return Err(syntax(*argument, "the name of an angle, or one such as `20 deg`"));
-                    };
-                    let known = env.cos_sin(angle);
-                    let (c, s) =
-                        known.ok_or_else(|| match angle.ends_with(" deg") || env.name(angle).is_some() {
-                            true => ExpressionError::Syntax {
-                                expected: "an angle that the scheme has",
-                                found: format!("`{angle}`"),
-                                span: expression.spans[*argument].clone(),
-                            },
-                            false => unknown(angle),
-                        })?;
-                    Ok((c, if minus { f.neg(s) } else { s }))
-                };
-                match function {
-                    Function::Cos => angle()?.0,
-                    Function::Sin => angle()?.1,
-                    Function::Sqrt => {
-                        let n = expression.integer_at(*argument);
-                        n.and_then(|n| env.sqrt(n)).ok_or_else(|| ExpressionError::Syntax {
-                            expected: "the root of 2, 3 or 6, or of one of these times a square",
-                            found: n
-                                .map_or_else(|| "that of something else".into(), |n| format!("that of {n}")),
-                            span: expression.spans[i].clone(),
-                        })?
-                    }
-                    _ => return Err(syntax(i, "sin or cos of an angle, or a square root")),
-                }
-            }
+            Node::Name(name) => self.env.name(name).ok_or_else(|| self.unknown(i, name))?,
+            Node::Call { function, argument } => self.call(i, *function, *argument)?,
             Node::Negate(a) => f.neg(values[*a]),
             Node::Add(a, b) => f.add(values[*a], values[*b]),
             Node::Subtract(a, b) => f.sub(values[*a], values[*b]),
             Node::Multiply(a, b) => f.mul(values[*a], values[*b]),
-            Node::Divide(a, b) => f.mul(values[*a], inverse(values[*b])?),
+            Node::Divide(a, b) => f.mul(values[*a], self.inverse(i, values[*b])?),
             Node::Power(a, b) => {
-                let Some(e) = expression.integer_at(*b) else {
-                    return Err(syntax(*b, "an integer exponent"));
+                let Some(e) = self.expression.integer_at(*b) else {
+                    return Err(self.syntax(*b, "an integer exponent", "something else".into()));
                 };
                 let power = f.pow(values[*a], e.unsigned_abs().into());
-                if e < 0 { inverse(power)? } else { power }
+                if e < 0 { self.inverse(i, power)? } else { power }
             }
-        };
-        values.push(value);
+        })
     }
-    Ok(values.last().copied().unwrap_or(0))
+
+    /// Value of a function in node i.
+    fn call(&self, i: usize, function: Function, argument: usize) -> Result<u64, ExpressionError> {
+        match function {
+            Function::Cos => Ok(self.cos_sin(i, argument)?.0),
+            Function::Sin => Ok(self.cos_sin(i, argument)?.1),
+            Function::Sqrt => {
+                let n = self.expression.integer_at(argument);
+                n.and_then(|n| self.env.sqrt(n)).ok_or_else(|| {
+                    let found = n.map_or_else(|| "that of something else".into(), |n| format!("that of {n}"));
+                    self.syntax(i, "the root of 2, 3 or 6, or of one of these times a square", found)
+                })
+            }
+            _ => Err(self.syntax(i, "sin or cos of an angle, or a square root", "something else".into())),
+        }
+    }
+
+    /// Cosine and sine of the angle that the node `argument` names; node i is the function.
+    fn cos_sin(&self, i: usize, argument: usize) -> Result<(u64, u64), ExpressionError> {
+        let Some((angle, minus)) = self.expression.angle_at(argument) else {
+            let expected = "the name of an angle, or one such as `20 deg`";
+            return Err(self.syntax(argument, expected, "something else".into()));
+        };
+        let known = self.env.cos_sin(angle);
+        let (c, s) =
+            known.ok_or_else(|| match angle.ends_with(" deg") || self.env.name(angle).is_some() {
+                true => self.syntax(argument, "an angle that the scheme has", format!("`{angle}`")),
+                false => self.unknown(i, angle),
+            })?;
+        Ok((c, if minus { self.f.neg(s) } else { s }))
+    }
 }
 
 /// Image of an integer.

@@ -1,7 +1,7 @@
 //! Number of solutions of every unknown, by stages: equations in the unknowns, relations among derivatives
 //! of the outputs, and maps between solutions if derivatives of a higher order might leave fewer solutions.
 
-use obsdeg_exact::groebner::Work;
+use obsdeg_exact::groebner::RemainingWork;
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::{Dag, Op};
@@ -87,7 +87,7 @@ impl Counting<'_> {
         if judged.findings.degrees.degree.len() > UNKNOWNS {
             return Err(NotCounted::TooLarge);
         }
-        let mut work = Work::new(stage.limit);
+        let mut work = RemainingWork::new(stage.limit);
         let functions = stage.whole.then_some(self.functions);
         let at = CountingPoint { f: self.fields[i], order, others: stage.others, known, functions };
         let found = at_point(model, compiled, judged, at, &mut self.random(i), &mut work);
@@ -204,8 +204,14 @@ impl Counting<'_> {
             let values = point.values(compiled, &judged.layout, model.constants.len());
             let mut rng = model.random(seed, &format!("relations, field {i}"));
             let system = (model, compiled, judged);
-            let known =
-                global::known(system, fields[i], &values, &mut found, &mut rng, &mut Work::new(limit));
+            let known = global::known(
+                system,
+                fields[i],
+                &values,
+                &mut found,
+                &mut rng,
+                &mut RemainingWork::new(limit),
+            );
             (known != RelationConsequences::default()).then_some(known)
         };
         Some([known(0)?, known(1)?])

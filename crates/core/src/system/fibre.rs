@@ -19,7 +19,7 @@
 
 use std::collections::BTreeSet;
 
-use obsdeg_exact::groebner::{Basis, Work};
+use obsdeg_exact::groebner::{GroebnerBasis, RemainingWork};
 use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
@@ -43,7 +43,7 @@ struct Equations<'a> {
     compiled: &'a Compiled,
     layout: &'a Layout,
     rows: SystemRows<'a, Field>,
-    work: &'a mut Work,
+    work: &'a mut RemainingWork,
     /// Value of every variable at the point.
     values: Vec<u64>,
     /// Weight of every variable.
@@ -73,7 +73,7 @@ impl<'a> Equations<'a> {
         judged: &'a Judgement,
         CountingPoint { f, known, .. }: CountingPoint<'_>,
         rows: SystemRows<'a, Field>,
-        work: &'a mut Work,
+        work: &'a mut RemainingWork,
     ) -> Self {
         let layout = &judged.layout;
         let values = rows.values(compiled, layout, 0);
@@ -388,7 +388,7 @@ fn equations<'a>(
     judged: &'a Judgement,
     at: CountingPoint<'_>,
     (rng, verdict): (&mut SplitMix64, &'a work::Work),
-    work: &'a mut Work,
+    work: &'a mut RemainingWork,
 ) -> Result<Equations<'a>, NotCounted> {
     let mut rows = SystemRows::with_inputs(model, compiled, &judged.layout, at.f, (rng, at.others), verdict)
         .map_err(|_| NotCounted::NoPoint)?;
@@ -473,7 +473,7 @@ pub(super) fn at_point(
     judged: &Judgement,
     at: CountingPoint<'_>,
     rng: &mut SplitMix64,
-    work: &mut Work,
+    work: &mut RemainingWork,
 ) -> Result<Fibre, NotCounted> {
     let f = at.f;
     let verdict = work::Work::new(model.work_limit);
@@ -507,7 +507,7 @@ pub(super) fn at_point(
     };
     let joint = wanted.pop().unwrap_or_default();
     let weights: Vec<u32> = used.iter().map(|&v| weights[v]).collect();
-    let mut basis = Basis::new(&f, &weights, &zero, work);
+    let mut basis = GroebnerBasis::new(&f, &weights, &zero, work);
     let mut ring = Quotients { f, basis: &mut basis };
     let polynomials: Vec<Result<Vec<u64>, NotCounted>> =
         wanted.iter().map(|p| ring.values(p, work)).collect();

@@ -2,7 +2,7 @@
 //! quotient ring of the equations.
 
 use obsdeg_exact::Field;
-use obsdeg_exact::groebner::{Basis, Work};
+use obsdeg_exact::groebner::{GroebnerBasis, RemainingWork};
 use obsdeg_exact::multivariate::Polynomial;
 
 use super::undecided::{NotCounted, SOLUTIONS};
@@ -19,22 +19,31 @@ pub(super) type Terms = Vec<(i64, Powers)>;
 /// Quotient ring of equations by their Groebner basis.
 pub(super) struct Quotients<'a> {
     pub(super) f: Field,
-    pub(super) basis: &'a mut Basis,
+    pub(super) basis: &'a mut GroebnerBasis,
 }
 
 impl Quotients<'_> {
     /// Polynomial whose roots are the values of an element at all solutions, constant term first.
-    pub(super) fn values(&mut self, p: &Polynomial, work: &mut Work) -> Result<Vec<u64>, NotCounted> {
+    pub(super) fn values(
+        &mut self,
+        p: &Polynomial,
+        work: &mut RemainingWork,
+    ) -> Result<Vec<u64>, NotCounted> {
         let f = self.f;
         if !self.basis.is_complete() {
             // an element that is a number modulo an ideal is one modulo every larger ideal
-            let number = self.basis.remainder(p, &mut Work::new(REMAINDER))?.as_constant();
+            let number = self.basis.remainder(p, &mut RemainingWork::new(REMAINDER))?.as_constant();
             return number.map(|x| vec![f.neg(x), f.one()]).ok_or(NotCounted::OverLimit);
         }
         self.basis.minimal_polynomial(p, SOLUTIONS, work)?.ok_or(NotCounted::TooMany)
     }
 
-    fn product(&mut self, a: &Polynomial, b: &Polynomial, work: &mut Work) -> Result<Polynomial, NotCounted> {
+    fn product(
+        &mut self,
+        a: &Polynomial,
+        b: &Polynomial,
+        work: &mut RemainingWork,
+    ) -> Result<Polynomial, NotCounted> {
         let mut out = Polynomial::default();
         work.take(1 + (a.len() * b.len()) as u64)?;
         out.add_product(&self.f, a, b);
@@ -42,7 +51,7 @@ impl Quotients<'_> {
     }
 
     /// Inverse of an element that vanishes at no solution: with `m(p) = 0`, it is `(m(0) - m(p))/(m(0) p)`.
-    fn inverse(&mut self, p: &Polynomial, work: &mut Work) -> Result<Polynomial, NotCounted> {
+    fn inverse(&mut self, p: &Polynomial, work: &mut RemainingWork) -> Result<Polynomial, NotCounted> {
         let f = self.f;
         let minimal = self.values(p, work)?;
         let last = f.inv(minimal[0]);
@@ -62,7 +71,7 @@ impl Quotients<'_> {
         &mut self,
         terms: &Terms,
         unknowns: &[Polynomial],
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Polynomial, NotCounted> {
         let f = self.f;
         let mut sum = Polynomial::default();

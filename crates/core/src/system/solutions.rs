@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 use obsdeg_exact::divisor::Algebra;
 use obsdeg_exact::fraction::Fraction;
-use obsdeg_exact::groebner::Work;
+use obsdeg_exact::groebner::RemainingWork;
 use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Field, SplitMix64};
 
@@ -102,7 +102,7 @@ pub(super) fn solutions(
         Err(reason) => return none(Some(reason)),
     };
     let mut rng = model.random(seed, "solving expressions");
-    let s = Algebra { f: fields[0], rng: model.random(seed, "elimination"), work: Work::new(WORK) };
+    let s = Algebra { f: fields[0], rng: model.random(seed, "elimination"), work: RemainingWork::new(WORK) };
     let (mut out, complete) = match by_elimination(s, model, compiled, judged, &signals) {
         Ok(found) => found,
         Err(reason) => return none(Some(reason)),

@@ -1,7 +1,7 @@
 //! Derivatives of outputs and known inputs ("jets") at random points of a model, and the choice of
 //! independent ones.
 
-use obsdeg_exact::groebner::{OverLimit, Work};
+use obsdeg_exact::groebner::{OverLimit, RemainingWork};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::super::dag::Op;
@@ -131,7 +131,7 @@ impl<'a> JetSource<'a> {
         values: &[u64],
         jets: &[Jet],
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let highest = jets.iter().map(|j| j.order).max().unwrap_or(0);
         work.take(self.cost(highest))?;
@@ -158,7 +158,7 @@ impl<'a> JetSource<'a> {
         jets: &[Jet],
         length: usize,
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Option<Vec<Vec<u64>>>, OverLimit> {
         let f = self.f;
         let highest = jets.iter().map(|j| j.order).max().unwrap_or(0) + length;

@@ -15,7 +15,7 @@ mod jets;
 mod ratios;
 mod relation;
 
-use obsdeg_exact::groebner::{Basis, OverLimit, Work};
+use obsdeg_exact::groebner::{GroebnerBasis, OverLimit, RemainingWork};
 use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
@@ -69,7 +69,7 @@ pub(super) fn known(
     at: &[u64],
     found: &mut ModelRelations,
     rng: &mut SplitMix64,
-    work: &mut Work,
+    work: &mut RemainingWork,
 ) -> RelationConsequences {
     let source = JetSource::new(model, compiled, &judged.layout, f);
     let Some(span) = &judged.span else { return RelationConsequences::default() };
@@ -136,7 +136,7 @@ impl ConstantFibre {
         source: &JetSource<'_>,
         relations: &[Relation],
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<(), OverLimit> {
         let mut all: Vec<Ratio> = Vec::new();
         for numbered in relations.iter().enumerate() {
@@ -222,7 +222,7 @@ impl ConstantFibre {
     }
 
     /// Open constants with one value.
-    fn unique(&self, work: &mut Work) -> Vec<usize> {
+    fn unique(&self, work: &mut RemainingWork) -> Vec<usize> {
         let f = self.f;
         let places = self.places();
         let space = self.space(&places);
@@ -243,9 +243,9 @@ impl ConstantFibre {
             ideal.push(zero);
         }
         let weights = vec![1; self.open.len() + below.len()];
-        let mut own = Work::new(work.left.min(BASIS));
+        let mut own = RemainingWork::new(work.left.min(BASIS));
         let before = own.left;
-        let mut basis = Basis::new(&f, &weights, &ideal, &mut own);
+        let mut basis = GroebnerBasis::new(&f, &weights, &ideal, &mut own);
         let mut out = Vec::new();
         for (i, &v) in self.open.iter().enumerate().filter(|(i, _)| space.has_unit(*i)) {
             let x = Polynomial::variable(&f, i as u32);

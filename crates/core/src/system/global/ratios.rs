@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use obsdeg_exact::dense::ColumnEchelon;
-use obsdeg_exact::groebner::{OverLimit, Work};
+use obsdeg_exact::groebner::{OverLimit, RemainingWork};
 use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::reconstruct::{Abscissae, Quotient};
 use obsdeg_exact::{Field, SplitMix64};
@@ -44,7 +44,7 @@ fn on_line(
     direction: &[(usize, u64)],
     first: Option<&Vec<u64>>,
     number: usize,
-    (rng, work): (&mut SplitMix64, &mut Work),
+    (rng, work): (&mut SplitMix64, &mut RemainingWork),
 ) -> Result<Vec<Vec<u64>>, OverLimit> {
     let f = source.f;
     let mut out: Vec<Vec<u64>> = first.into_iter().cloned().collect();
@@ -93,7 +93,7 @@ pub(super) fn ratios(
     at: &[u64],
     variables: &[usize],
     rng: &mut SplitMix64,
-    work: &mut Work,
+    work: &mut RemainingWork,
 ) -> Result<Vec<Ratio>, OverLimit> {
     let f = source.f;
     let direction: Vec<(usize, u64)> = variables.iter().map(|&v| (v, rng.below(f.modulus()))).collect();
@@ -216,7 +216,7 @@ impl<'s, 'a> Pool<'s, 'a> {
         relation: usize,
         number: usize,
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<(), OverLimit> {
         let f = self.source.f;
         while self.drawn.len() < number {
@@ -243,7 +243,7 @@ impl<'s, 'a> Pool<'s, 'a> {
         ratio: &Ratio,
         open: &[usize],
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Option<[Polynomial; 2]>, OverLimit> {
         let f = self.source.f;
         let above = boxed(ratio.degrees.0, &ratio.limits(open, false));

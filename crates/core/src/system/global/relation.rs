@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use obsdeg_exact::dense::ColumnEchelon;
-use obsdeg_exact::groebner::{OverLimit, Work};
+use obsdeg_exact::groebner::{OverLimit, RemainingWork};
 use obsdeg_exact::{Field, SplitMix64};
 
 use super::jets::{BEYOND, Jet, JetSource, Structure};
@@ -106,7 +106,7 @@ impl JetPoints<'_, '_> {
         products: &[Exponents],
         number: usize,
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Vec<Vec<u64>>, OverLimit> {
         while self.drawn.len() < number {
             let point = self.source.point(self.at, &self.jets, rng, work)?;
@@ -130,7 +130,7 @@ pub(super) fn relations(
     structure: &Structure,
     at: &[u64],
     rng: &mut SplitMix64,
-    work: &mut Work,
+    work: &mut RemainingWork,
 ) -> Vec<Relation> {
     let mut out: Vec<Relation> = Vec::new();
     let outputs = structure.first_dependent.len();
@@ -164,7 +164,7 @@ fn together(
     jets: Vec<Jet>,
     at: &[u64],
     rng: &mut SplitMix64,
-    work: &mut Work,
+    work: &mut RemainingWork,
 ) -> Result<Vec<Relation>, OverLimit> {
     let weights: Vec<usize> = jets.iter().map(|j| j.order).collect();
     let mut points = JetPoints { source, at, jets: jets.clone(), drawn: Vec::new() };
@@ -195,7 +195,7 @@ fn led_by(
     leader: usize,
     at: &[u64],
     rng: &mut SplitMix64,
-    work: &mut Work,
+    work: &mut RemainingWork,
 ) -> Result<Option<Relation>, OverLimit> {
     let sets: Vec<Vec<Jet>> = (0..=BEYOND).map(|b| structure.jets(Some(leader), b)).collect();
     let weights: Vec<Vec<usize>> = sets.iter().map(|s| s.iter().map(|j| j.order).collect()).collect();
@@ -257,7 +257,7 @@ impl Relation {
         source: &JetSource<'_>,
         at: &[u64],
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let size = self.products.len();
         let mut points = JetPoints { source, at, jets: self.jets.clone(), drawn: Vec::new() };
@@ -274,7 +274,7 @@ impl Relation {
         source: &JetSource<'_>,
         at: &[u64],
         rng: &mut SplitMix64,
-        work: &mut Work,
+        work: &mut RemainingWork,
     ) -> Result<bool, OverLimit> {
         let (f, size) = (source.f, self.products.len());
         let length = size + SPARE;
