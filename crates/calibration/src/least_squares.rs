@@ -403,13 +403,20 @@ mod tests {
         assert!((found - expected).amax() < 1e-12);
     }
 
-    /// A random walk in two states with a constant, partly observed, against the normal equations of all
-    /// states at once.
-    #[test]
-    fn all_states_at_once() {
-        let phi = DMatrix::from_row_slice(3, 3, &[1.0, 0.3, 0.5, -0.1, 0.9, 0.0, 0.0, 0.0, 1.0]);
-        let g = DMatrix::from_row_slice(3, 2, &[0.4, 0.0, 0.1, 0.2, 0.0, 0.0]);
-        let z = [0.7, 1.9, -0.4, 0.2, 2.2, 1.0, 0.3, -0.8];
+    /// Measurements of the run below; that of step 3 is missing.
+    const Z: [f64; 8] = [0.7, 1.9, -0.4, 0.2, 2.2, 1.0, 0.3, -0.8];
+
+    fn phi() -> DMatrix<f64> {
+        DMatrix::from_row_slice(3, 3, &[1.0, 0.3, 0.5, -0.1, 0.9, 0.0, 0.0, 0.0, 1.0])
+    }
+
+    fn noise_root() -> DMatrix<f64> {
+        DMatrix::from_row_slice(3, 2, &[0.4, 0.0, 0.1, 0.2, 0.0, 0.0])
+    }
+
+    /// Run of a random walk in two states with a constant, partly observed.
+    fn random_walk() -> Linearised {
+        let (phi, g) = (phi(), noise_root());
         let stage = |k: usize| Stage {
             transition: Transition::new(&phi).expect("finite"),
             noise: ProcessNoise::new(&(&g * g.transpose())).expect("Q"),
@@ -417,14 +424,26 @@ mod tests {
             outputs: if k == 3 { vec![] } else { vec![ScalarOutput { h: vec![(0, 1.0), (1, 0.5)], r: 0.3 }] },
             steps: 1,
         };
-        let residuals: Vec<f64> = (0..8).filter(|k| *k != 3).map(|k| z[k]).collect();
-        let run = Linearised {
+        Linearised {
             stages: (0..8).map(stage).collect(),
             roots: vec![g.clone(); 8],
-            residuals,
+            residuals: (0..8).filter(|k| *k != 3).map(|k| Z[k]).collect(),
             gaps: vec![],
-        };
-        // unknowns: the start (3), then xi of every step (2 each)
+        }
+    }
+
+    /// Normal equations of all states of that run at once.
+    struct NormalEquations {
+        /// Matrices from the unknowns, the start (3) and xi of every step (2 each), to the states.
+        maps: Vec<DMatrix<f64>>,
+        covariance: DMatrix<f64>,
+        right: DVector<f64>,
+        /// Sum of squares of the measurements.
+        squares: f64,
+    }
+
+    fn normal_equations() -> NormalEquations {
+        let (phi, g) = (phi(), noise_root());
         let n = 3 + 16;
         let (mut information, mut right, mut squares) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
         let mut map = DMatrix::zeros(3, n);
@@ -439,27 +458,24 @@ mod tests {
             }
             if k != 3 {
                 let row = (map.row(0) + map.row(1) * 0.5) / 0.3f64.sqrt();
-                let value = z[k] / 0.3f64.sqrt();
+                let value = Z[k] / 0.3f64.sqrt();
                 information += row.transpose() * &row;
                 right += row.transpose() * value;
                 squares += value * value;
             }
         }
         let covariance = information.try_inverse().expect("definite");
+        NormalEquations { maps, covariance, right, squares }
+    }
+
+    /// A random walk in two states with a constant, partly observed, against the normal equations of all
+    /// states at once.
+    #[test]
+    fn all_states_at_once() {
+        let run = random_walk();
+        let NormalEquations { maps, covariance, right, squares } = normal_equations();
         let x = &covariance * &right;
         let found = Information::of(&run).expect("finite");
-        // the same run about a trajectory in two parts: the second begins elsewhere after step 4
-        let c = DVector::from_column_slice(&[0.6, -1.1, 0.4]);
-        let mut parted = Linearised { gaps: vec![(4, -&c)], ..run.clone() };
-        let mut at = c;
-        // step 3 has no measurement
-        for row in 4..7 {
-            at = &phi * at;
-            parted.residuals[row] -= at[0] + 0.5 * at[1];
-        }
-        let again = Information::of(&parted).expect("finite");
-        assert!((again.at_zero() - found.at_zero()).abs() < 1e-9);
-        assert!((again.left - found.left).abs() < 1e-9 && (&again.right - &found.right).amax() < 1e-9);
         let mut rows = Rows::new(3);
         rows.add(&found.root, &found.right);
         let solution = rows.solve().expect("determined");
@@ -473,5 +489,23 @@ mod tests {
             let gap = found - map * &covariance * map.transpose();
             assert!(gap.amax() < 1e-10, "covariance {k}");
         }
+    }
+
+    /// The same run about a trajectory in two parts: the second begins elsewhere after step 4.
+    #[test]
+    fn gaps_change_nothing() {
+        let run = random_walk();
+        let found = Information::of(&run).expect("finite");
+        let c = DVector::from_column_slice(&[0.6, -1.1, 0.4]);
+        let mut parted = Linearised { gaps: vec![(4, -&c)], ..run.clone() };
+        let (phi, mut at) = (phi(), c);
+        // step 3 has no measurement
+        for row in 4..7 {
+            at = &phi * at;
+            parted.residuals[row] -= at[0] + 0.5 * at[1];
+        }
+        let again = Information::of(&parted).expect("finite");
+        assert!((again.at_zero() - found.at_zero()).abs() < 1e-9);
+        assert!((again.left - found.left).abs() < 1e-9 && (&again.right - &found.right).amax() < 1e-9);
     }
 }

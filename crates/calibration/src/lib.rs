@@ -27,6 +27,7 @@
 pub mod answer;
 pub mod bins;
 mod compared;
+mod csv_lines;
 pub mod least_squares;
 pub mod levels;
 pub mod noise;

@@ -20,6 +20,7 @@ use parquet::file::reader::FileReader;
 use parquet::record::Field;
 use sha2::{Digest, Sha256};
 
+use crate::csv_lines::{Lines, SEPARATORS, number, unix_seconds};
 #[cfg(feature = "parquet")]
 use crate::zstd_pages::ParquetFile;
 
@@ -162,54 +163,6 @@ pub struct Column {
     pub other: Option<String>,
 }
 
-/// Seconds since 1970-01-01T00:00Z of a date with a time (ISO 8601, UTC where no offset is given), such as
-/// `2026-11-23T10:00:00.25+01:00`; a blank may replace T. A date with points is day, month, year.
-fn unix_seconds(text: &str) -> Option<f64> {
-    let (date, time) = text.split_once(['T', ' '])?;
-    let whole = |text: &str, digits: usize| {
-        let is = text.len() == digits && text.bytes().all(|b| b.is_ascii_digit());
-        text.parse::<i64>().ok().filter(|_| is)
-    };
-    let mut parts: Vec<&str> = date.split('-').collect();
-    if date.contains('.') {
-        parts = date.rsplit('.').collect();
-    }
-    let &[year, month, day] = &parts[..] else { return None };
-    let (year, month, day) = (whole(year, 4)?, whole(month, 2)?, whole(day, 2)?);
-    let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
-    let days = [31, if leap { 29 } else { 28 }, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
-    let valid = (1..=12).contains(&month) && (1..=*days.get(month as usize - 1)?).contains(&day);
-    if !valid {
-        return None;
-    }
-    let (time, offset) = match time.find(['Z', '+', '-']) {
-        None => (time, 0),
-        Some(at) if &time[at..] == "Z" => (&time[..at], 0),
-        Some(at) => {
-            let sign = if time[at..].starts_with('-') { -1 } else { 1 };
-            let (h, m) = time[at + 1..].split_once(':').unwrap_or((&time[at + 1..], "00"));
-            (&time[..at], sign * (3600 * whole(h, 2)? + 60 * whole(m, 2)?))
-        }
-    };
-    let mut parts = time.split(':');
-    let (hour, minute) = (whole(parts.next()?, 2)?, whole(parts.next()?, 2)?);
-    let second = match parts.next() {
-        Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => {
-            text.replacen(',', ".", 1).parse::<f64>().ok()?
-        }
-        Some(_) => return None,
-        None => 0.0,
-    };
-    if parts.next().is_some() || hour > 23 || minute > 59 || second >= 61.0 {
-        return None;
-    }
-    // days of whole years since 1970, by leap years before
-    let leaps = |y: i64| y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400);
-    let before: i64 = days[..month as usize - 1].iter().sum();
-    let day = 365 * (year - 1970) + leaps(year - 1) - leaps(1969) + before + day - 1;
-    Some((86400 * day + 3600 * hour + 60 * minute - offset) as f64 + second)
-}
-
 impl Column {
     fn of(text: &str) -> Option<Self> {
         let whole = text.trim();
@@ -230,120 +183,20 @@ impl Column {
 }
 
 /// Source of the rows.
-enum Rows {
+enum RowSource {
     Csv(Lines),
     #[cfg(feature = "parquet")]
     Parquet(Box<dyn FileReader>),
 }
 
-/// Lines of CSV with their numbers.
-struct Lines {
-    text: BufReader<Box<dyn Read>>,
-    line: u64,
-    cells: Vec<String>,
-    buffer: Vec<u8>,
-    /// Separator of columns.
-    separator: char,
-    /// True if the cells belong to a row that has not been returned yet.
-    held: bool,
-}
-
-/// Separators of columns besides the comma, with their names.
-const SEPARATORS: [(char, &str); 2] = [(';', "semicolons"), ('\t', "tabs")];
-
-/// Number in a cell: with a decimal comma where another character separates the columns.
-fn number(text: &str, separator: char) -> Option<f64> {
-    if separator != ','
-        && let Some((whole, part)) = text.split_once(',')
-        && !text.contains('.')
-    {
-        return format!("{whole}.{part}").parse().ok();
-    }
-    text.parse().ok()
-}
-
 /// Most bytes of Parquet from a pipe: its header comes last, so that all of it is kept in memory.
 #[cfg(feature = "parquet")]
 const PIPED: u64 = 1 << 28;
-/// Longest line, in bytes.
-const LONGEST: u64 = 1 << 20;
-
-impl Lines {
-    /// Reads the cells of the next line that is neither empty nor a comment; false at the end.
-    fn next(&mut self, record: &str) -> Result<bool, RecordError> {
-        if std::mem::take(&mut self.held) {
-            return Ok(true);
-        }
-        let wrong = |reason: String| RecordError::Read { record: record.into(), reason };
-        loop {
-            self.buffer.clear();
-            let read = (&mut self.text).take(LONGEST).read_until(b'\n', &mut self.buffer);
-            let read = read.map_err(|e| wrong(e.to_string()))?;
-            if read == 0 {
-                return Ok(false);
-            }
-            self.line += 1;
-            if read as u64 == LONGEST {
-                return Err(wrong(format!("line {} is longer than {LONGEST} bytes", self.line)));
-            }
-            let text = std::str::from_utf8(&self.buffer)
-                .map_err(|_| {
-                    let marks = [[0xff, 0xfe], [0xfe, 0xff]];
-                    let utf16 = self.line == 1 && marks.iter().any(|m| self.buffer.starts_with(m));
-                    let hint = if utf16 { " (it begins as UTF-16 does)" } else { "" };
-                    wrong(format!("line {} is no UTF-8 text{hint}", self.line))
-                })?
-                .trim_end_matches(['\n', '\r']);
-            match text.bytes().find(|b| b.is_ascii_control() && *b != b'\t') {
-                Some(b'\r') => {
-                    let reason = "lines end with CR alone; expected LF or CR LF";
-                    return Err(wrong(reason.into()));
-                }
-                Some(b) => {
-                    let reason = format!("line {} has a byte {b:#04x} in it, which no text has", self.line);
-                    return Err(wrong(reason));
-                }
-                None => {}
-            }
-            if text.trim().is_empty() || text.starts_with('#') {
-                continue;
-            }
-            if self.separator == '\0' {
-                let other = SEPARATORS.iter().find(|(c, _)| !text.contains(',') && text.contains(*c));
-                self.separator = other.map_or(',', |(c, _)| *c);
-            }
-            if text.contains('"') {
-                self.cells.clear();
-                let mut builder = csv::ReaderBuilder::new();
-                let builder = builder.has_headers(false).delimiter(self.separator as u8);
-                let mut reader = builder.from_reader(text.as_bytes());
-                let cells = reader.records().next().transpose().map_err(|e| wrong(e.to_string()))?;
-                self.cells.extend(cells.iter().flatten().map(|c| c.trim().to_string()));
-            } else {
-                // the strings of the row before are reused
-                let mut count = 0;
-                for cell in text.split(self.separator).map(str::trim) {
-                    match self.cells.get_mut(count) {
-                        Some(own) => {
-                            own.clear();
-                            own.push_str(cell);
-                        }
-                        None => self.cells.push(cell.into()),
-                    }
-                    count += 1;
-                }
-                self.cells.truncate(count);
-            }
-            return Ok(true);
-        }
-    }
-}
-
 /// Record whose header has been read.
 pub struct Record {
     name: String,
     columns: Vec<Column>,
-    rows: Rows,
+    rows: RowSource,
     /// Separator and decimal mark in words; `None` for commas and points.
     written: Option<String>,
 }
@@ -417,9 +270,9 @@ impl Record {
     /// Number of rows; `None` unless the file states it before them.
     pub(crate) fn rows_stated(&self) -> Option<usize> {
         match &self.rows {
-            Rows::Csv(_) => None,
+            RowSource::Csv(_) => None,
             #[cfg(feature = "parquet")]
-            Rows::Parquet(reader) => usize::try_from(reader.metadata().file_metadata().num_rows()).ok(),
+            RowSource::Parquet(reader) => usize::try_from(reader.metadata().file_metadata().num_rows()).ok(),
         }
     }
 
@@ -451,7 +304,7 @@ impl Record {
                 _ => None,
             };
         }
-        Ok(Self { name: name.into(), columns, rows: Rows::Parquet(reader), written: None })
+        Ok(Self { name: name.into(), columns, rows: RowSource::Parquet(reader), written: None })
     }
 
     /// Record in CSV.
@@ -466,14 +319,14 @@ impl Record {
         if text.fill_buf().map_err(|e| wrong(&e))?.starts_with(&[0xef, 0xbb, 0xbf]) {
             text.consume(3);
         }
-        let mut lines =
-            Lines { text, line: 0, cells: Vec::new(), buffer: Vec::new(), separator: '\0', held: false };
-        if !lines.next(name)? {
+        let reason = |reason: String| RecordError::Read { record: name.into(), reason };
+        let mut lines = Lines::new(text);
+        if !lines.next().map_err(reason)? {
             return Err(RecordError::Empty { record: name.into() });
         }
         let mut columns = columns(name, lines.cells.clone(), lines.line)?;
         // the first row shows how numbers and times are written
-        lines.held = lines.next(name)?;
+        lines.held = lines.next().map_err(reason)?;
         let decimal = |c: &String| c.contains(',') && number(c, lines.separator).is_some();
         let separator = SEPARATORS.iter().find(|(c, _)| *c == lines.separator).map(|(_, name)| *name);
         let written = separator.map(|name| {
@@ -487,7 +340,7 @@ impl Record {
                 column.other = Some(format!("`{cell}`"));
             }
         }
-        Ok(Self { name: name.into(), columns, rows: Rows::Csv(lines), written })
+        Ok(Self { name: name.into(), columns, rows: RowSource::Csv(lines), written })
     }
 
     /// Separator and decimal mark in words; `None` for commas and points.
@@ -605,54 +458,15 @@ impl Record {
         mut each: impl FnMut(Row<'_>) -> Result<(), E>,
     ) -> Result<String, E> {
         let Self { name, columns, rows, .. } = self;
-        let mut digest = Sha256::new();
-        let mut before = f64::NEG_INFINITY;
-        let mut last = String::new();
-        let mut any = false;
-        let mut row = |line: u64, cell: &mut dyn FnMut(usize) -> Cell, label: &str| -> Result<(), E> {
-            let mut numbers = [None; MOST];
-            for (i, (slot, w)) in numbers.iter_mut().zip(wanted).enumerate() {
-                let at = || place(&name, line, &columns[w.column].text);
-                *slot = match cell(w.column) {
-                    Cell::Number(x) if x.is_finite() => Some(x * w.scale),
-                    Cell::Number(x) => {
-                        let expected = "a finite number (an empty cell is a value that is not there)";
-                        return Err(RecordError::Value { place: at(), found: x.to_string(), expected }.into());
-                    }
-                    Cell::Nothing => None,
-                    Cell::Text(found) => {
-                        let expected = if i == 0 { TIME } else { "a number" };
-                        return Err(RecordError::Number { place: at(), expected, found }.into());
-                    }
-                };
-            }
-            let at = || place(&name, line, &columns[wanted[0].column].text);
-            let Some(t) = numbers[0] else {
-                return Err(RecordError::Number { place: at(), expected: TIME, found: String::new() }.into());
-            };
-            if anew && label != last {
-                before = f64::NEG_INFINITY;
-                last = label.into();
-            }
-            if t <= before {
-                // as written, without the rounding of the scale
-                let written = |t: f64| (t / wanted[0].scale * 1e9).round() / 1e9;
-                let (found, before) = (written(t).to_string(), written(before).to_string());
-                return Err(RecordError::Time { place: at(), found, before }.into());
-            }
-            (before, any) = (t, true);
-            // NaN for a missing value
-            let mut bytes = [0; 8 * MOST];
-            let bytes = &mut bytes[..8 * wanted.len()];
-            for (x, place) in numbers.iter().zip(bytes.chunks_exact_mut(8)) {
-                place.copy_from_slice(&(x.unwrap_or(f64::NAN) + 0.0).to_le_bytes());
-            }
-            digest.update(&*bytes);
+        let mut check = RowCheck::new(&name, &columns, wanted, anew);
+        let mut row = |line: u64, cell: &mut dyn FnMut(usize) -> CellContent, label: &str| -> Result<(), E> {
+            let numbers = check.numbers(line, cell, label)?;
             each(Row { line, numbers: &numbers[..wanted.len()], label })
         };
         match rows {
-            Rows::Csv(mut lines) => {
-                while lines.next(&name)? {
+            RowSource::Csv(mut lines) => {
+                let wrong = |reason: String| RecordError::Read { record: name.clone(), reason };
+                while lines.next().map_err(wrong)? {
                     let (line, cells) = (lines.line, &lines.cells);
                     if cells.len() != columns.len() {
                         let (found, expected) = (cells.len(), columns.len());
@@ -662,17 +476,17 @@ impl Record {
                     }
                     let separator = lines.separator;
                     let mut cell = |i: usize| match cells[i].as_str() {
-                        "" => Cell::Nothing,
-                        text if columns[i].dates => {
-                            unix_seconds(text).map_or_else(|| Cell::Text(text.into()), Cell::Number)
-                        }
-                        text => number(text, separator).map_or_else(|| Cell::Text(text.into()), Cell::Number),
+                        "" => CellContent::Nothing,
+                        text if columns[i].dates => unix_seconds(text)
+                            .map_or_else(|| CellContent::Text(text.into()), CellContent::Number),
+                        text => number(text, separator)
+                            .map_or_else(|| CellContent::Text(text.into()), CellContent::Number),
                     };
                     row(line, &mut cell, label.map_or("", |i| &cells[i]))?;
                 }
             }
             #[cfg(feature = "parquet")]
-            Rows::Parquet(reader) => {
+            RowSource::Parquet(reader) => {
                 let wrong = |e: parquet::errors::ParquetError| RecordError::Read {
                     record: name.clone(),
                     reason: e.to_string(),
@@ -681,14 +495,108 @@ impl Record {
                     let read = read.map_err(wrong)?;
                     let fields: Vec<&Field> = read.get_column_iter().map(|(_, f)| f).collect();
                     let label = label.map_or_else(String::new, |i| text_of(fields[i]));
-                    row(i as u64 + 1, &mut |i| Cell::of(fields[i]), &label)?;
+                    row(i as u64 + 1, &mut |i| CellContent::of(fields[i]), &label)?;
                 }
             }
         }
-        if !any {
-            return Err(RecordError::NoRows { record: name }.into());
+        Ok(check.digest()?)
+    }
+}
+
+/// Check of the rows of a record, one after the other, with their digest.
+struct RowCheck<'a> {
+    /// Name of the record.
+    record: &'a str,
+    columns: &'a [Column],
+    wanted: &'a [Wanted],
+    /// True if times may start again with another label.
+    anew: bool,
+    digest: Sha256,
+    /// Time of the row before; -infinity before the first.
+    before: f64,
+    /// Label of the row before.
+    last: String,
+    /// True after the first row.
+    any: bool,
+}
+
+impl<'a> RowCheck<'a> {
+    fn new(record: &'a str, columns: &'a [Column], wanted: &'a [Wanted], anew: bool) -> Self {
+        let (digest, before, last) = (Sha256::new(), f64::NEG_INFINITY, String::new());
+        Self { record, columns, wanted, anew, digest, before, last, any: false }
+    }
+
+    /// Place of the requested number `i` in a line.
+    fn at(&self, line: u64, i: usize) -> Place {
+        place(self.record, line, &self.columns[self.wanted[i].column].text)
+    }
+
+    /// Requested numbers of a row, whose time is after that of the row before.
+    fn numbers(
+        &mut self,
+        line: u64,
+        cell: &mut dyn FnMut(usize) -> CellContent,
+        label: &str,
+    ) -> Result<[Option<f64>; MOST], RecordError> {
+        let mut numbers = [None; MOST];
+        for (i, (slot, w)) in numbers.iter_mut().zip(self.wanted).enumerate() {
+            *slot = self.number(line, i, cell(w.column))?;
         }
-        Ok(digest.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect())
+        let Some(t) = numbers[0] else {
+            let (place, found) = (self.at(line, 0), String::new());
+            return Err(RecordError::Number { place, expected: TIME, found });
+        };
+        if self.anew && label != self.last {
+            self.before = f64::NEG_INFINITY;
+            self.last = label.into();
+        }
+        if t <= self.before {
+            // as written, without the rounding of the scale
+            let written = |t: f64| (t / self.wanted[0].scale * 1e9).round() / 1e9;
+            let (found, before) = (written(t).to_string(), written(self.before).to_string());
+            return Err(RecordError::Time { place: self.at(line, 0), found, before });
+        }
+        (self.before, self.any) = (t, true);
+        self.add(&numbers);
+        Ok(numbers)
+    }
+
+    /// Requested number `i` of a line; `None` for an empty cell.
+    fn number(&self, line: u64, i: usize, cell: CellContent) -> Result<Option<f64>, RecordError> {
+        match cell {
+            CellContent::Number(x) if x.is_finite() => Ok(Some(x * self.wanted[i].scale)),
+            CellContent::Number(x) => {
+                let expected = "a finite number (an empty cell is a value that is not there)";
+                Err(RecordError::Value { place: self.at(line, i), found: x.to_string(), expected })
+            }
+            CellContent::Nothing => Ok(None),
+            CellContent::Text(found) => {
+                let expected = if i == 0 { TIME } else { "a number" };
+                Err(RecordError::Number { place: self.at(line, i), expected, found })
+            }
+        }
+    }
+
+    /// Adds the numbers of a row to the digest.
+    fn add(&mut self, numbers: &[Option<f64>; MOST]) {
+        // NaN for a missing value
+        let mut bytes = [0; 8 * MOST];
+        let bytes = &mut bytes[..8 * self.wanted.len()];
+        for (x, place) in numbers.iter().zip(bytes.chunks_exact_mut(8)) {
+            place.copy_from_slice(&(x.unwrap_or(f64::NAN) + 0.0).to_le_bytes());
+        }
+        self.digest.update(&*bytes);
+    }
+
+    /// Digest of all rows.
+    ///
+    /// # Errors
+    /// [`RecordError::NoRows`].
+    fn digest(self) -> Result<String, RecordError> {
+        if !self.any {
+            return Err(RecordError::NoRows { record: self.record.into() });
+        }
+        Ok(self.digest.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect())
     }
 }
 
@@ -702,14 +610,14 @@ pub const MOST: usize = 64;
 const TIME: &str = "a number, the time since any moment";
 
 /// Content of a cell.
-enum Cell {
+enum CellContent {
     Number(f64),
     Nothing,
     Text(String),
 }
 
 #[cfg(feature = "parquet")]
-impl Cell {
+impl CellContent {
     fn of(field: &Field) -> Self {
         match field {
             Field::Double(x) => Self::Number(*x),
@@ -732,14 +640,14 @@ impl Cell {
 
 /// Decimal number: the integer in its bytes, the highest first, in units of 10^-scale.
 #[cfg(feature = "parquet")]
-fn decimal(bytes: &[u8], scale: i32) -> Cell {
+fn decimal(bytes: &[u8], scale: i32) -> CellContent {
     let negative = bytes.first().is_some_and(|b| *b >= 0x80);
     if bytes.len() > 16 {
-        return Cell::Text("a decimal of more than 38 digits".into());
+        return CellContent::Text("a decimal of more than 38 digits".into());
     }
     let whole = bytes.iter().fold(if negative { -1_i128 } else { 0 }, |x, b| (x << 8) | i128::from(*b));
     // parsed from text, without a second rounding
-    format!("{whole}e{}", -scale).parse().map_or(Cell::Nothing, Cell::Number)
+    format!("{whole}e{}", -scale).parse().map_or(CellContent::Nothing, CellContent::Number)
 }
 
 /// Text of a Parquet label.

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{AZIMUTH, Platform, Scheme};
-use obsdeg_ekf::linear::{filter_pass, smoothed_start};
+use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, EkfError, Form};
 use obsdeg_evidence::acceptance::{Measured, acceptance};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
@@ -19,8 +19,8 @@ use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, 
 use super::curvature::Bent;
 use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
 use super::jump::Jump;
-use super::placed::channel_name;
 use super::offset::{Later, Offset};
+use super::placed::channel_name;
 use super::run::Key;
 use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options};
@@ -74,6 +74,48 @@ pub(crate) struct Diagnosed {
     pub white: RefCell<BTreeMap<(usize, usize), Option<f64>>>,
 }
 
+/// Prior standard deviations of the states of run `r`, wider than those of the scheme. Random biases have
+/// priors of their own.
+fn wide_prior(problem: &Problem<'_>, r: usize) -> Vec<f64> {
+    let own = &problem.runs[r].plan;
+    let wide =
+        |(s, &i): (usize, &usize)| problem.unknowns.prior[i] * if s < own.unknowns() { WIDE } else { 1.0 };
+    problem.unknowns.index[r].iter().enumerate().map(wide).collect()
+}
+
+/// Filter along a linearised run.
+struct FilterPath {
+    /// Correction and standard deviations of the state at the end.
+    end: Option<(Vec<f64>, Vec<f64>)>,
+    whitened: Vec<f64>,
+    smoothed: SmoothedStart,
+}
+
+impl FilterPath {
+    /// Filter along a run with these prior standard deviations.
+    fn along(run: &Linearised, prior: &[f64]) -> Result<Self, EkfError> {
+        let n = prior.len();
+        let p0 = DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| s * s)));
+        let (mut delta, mut whitened) = (vec![0.0; n], Vec::with_capacity(run.residuals.len()));
+        let mut end: Option<(Vec<f64>, Vec<f64>)> = None;
+        let mut first = 0;
+        let mut measure = |_: usize, _: usize, z: &mut [f64]| {
+            z.copy_from_slice(&run.residuals[first..first + z.len()]);
+            first += z.len();
+        };
+        let covariance = Covariance::new("P0", &p0, Form::Ud)?;
+        let steps = run.stages.len();
+        let gains = filter_pass(&run.stages, covariance, &mut delta, &mut measure, |step, x, p, w| {
+            whitened.extend_from_slice(w);
+            if step + 1 == steps {
+                end = Some((x.to_vec(), p.sigmas()));
+            }
+        })?;
+        let smoothed = smoothed_start(&run.stages, &gains, &whitened, &p0)?;
+        Ok(Self { end, whitened, smoothed })
+    }
+}
+
 impl Diagnosed {
     /// Diagnosis of an estimate.
     ///
@@ -91,63 +133,58 @@ impl Diagnosed {
             white: RefCell::default(),
         };
         for (r, (run, keys)) in estimate.at.runs.iter().enumerate() {
-            let index = &problem.unknowns.index[r];
-            let own = &problem.runs[r].plan;
-            // random biases have priors of their own
-            let wide = |(s, &i): (usize, &usize)| {
-                problem.unknowns.prior[i] * if s < own.unknowns() { WIDE } else { 1.0 }
-            };
-            let prior: Vec<f64> = index.iter().enumerate().map(wide).collect();
-            let n = prior.len();
-            let p0 = DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| s * s)));
-            let (mut delta, mut whitened) = (vec![0.0; n], Vec::with_capacity(run.residuals.len()));
-            let mut end: Option<(Vec<f64>, Vec<f64>)> = None;
-            let mut first = 0;
-            let mut measure = |_: usize, _: usize, z: &mut [f64]| {
-                z.copy_from_slice(&run.residuals[first..first + z.len()]);
-                first += z.len();
-            };
-            let covariance = Covariance::new("P0", &p0, Form::Ud)?;
-            let steps = run.stages.len();
-            let gains = filter_pass(&run.stages, covariance, &mut delta, &mut measure, |step, x, p, w| {
-                whitened.extend_from_slice(w);
-                if step + 1 == steps {
-                    end = Some((x.to_vec(), p.sigmas()));
-                }
-            })?;
-            let smoothed = smoothed_start(&run.stages, &gains, &whitened, &p0)?;
-            let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
-            let each = smoothed.left_out.iter().zip(variances).zip(keys).zip(&whitened);
-            for (((left, r_of), key), innovation) in each {
-                out.all.push(MeasurementResidual {
-                    run: r,
-                    key: *key,
-                    residual: r_of * left.u,
-                    r: r_of,
-                    free: r_of * left.variance,
-                    normalised: left.normalised(),
-                    innovation: *innovation,
-                });
-            }
-            let information = &estimate.at.information[r];
-            let mut rows = Rows::new(n);
-            rows.add(&information.root, &information.right);
-            let pull = DVector::from_iterator(n, prior.iter().map(|s| 1.0 / s));
-            rows.add(&DMatrix::from_diagonal(&pull), &DVector::zeros(n));
-            let batch = rows.solve()?;
-            out.alone.push(information.left + batch.left);
-            let start = State { correction: batch.x.clone(), root: batch.inverse_root.clone() };
-            let states = information.states(run, start)?;
-            if let (Some((x, sigmas)), Some(last)) = (end, states.last()) {
-                let determined = |s: usize| prediction.unknowns.get(s).is_some_and(|u| u.determined_at_end);
-                for (i, (x, sigma)) in x.iter().zip(&sigmas).enumerate().filter(|(s, _)| determined(*s)) {
-                    let own = last.sigma(i);
-                    out.second.difference = out.second.difference.max((x - last.correction[i]).abs() / sigma);
-                    out.second.sigma_difference = out.second.sigma_difference.max((own / sigma - 1.0).abs());
-                }
-            }
+            let prior = wide_prior(problem, r);
+            let path = FilterPath::along(run, &prior)?;
+            out.add(r, run, keys, &path);
+            out.compare(run, &estimate.at.information[r], (&prior[..], &path), prediction)?;
         }
         Ok(out)
+    }
+
+    /// Adds the residuals of run `r`.
+    fn add(&mut self, r: usize, run: &Linearised, keys: &[Key], path: &FilterPath) {
+        let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
+        let each = path.smoothed.left_out.iter().zip(variances).zip(keys).zip(&path.whitened);
+        for (((left, r_of), key), innovation) in each {
+            self.all.push(MeasurementResidual {
+                run: r,
+                key: *key,
+                residual: r_of * left.u,
+                r: r_of,
+                free: r_of * left.variance,
+                normalised: left.normalised(),
+                innovation: *innovation,
+            });
+        }
+    }
+
+    /// Compares the end of a filter along a run with that of least squares with the same prior.
+    fn compare(
+        &mut self,
+        run: &Linearised,
+        information: &Information,
+        (prior, path): (&[f64], &FilterPath),
+        prediction: &Prediction,
+    ) -> Result<(), EkfError> {
+        let n = prior.len();
+        let mut rows = Rows::new(n);
+        rows.add(&information.root, &information.right);
+        let pull = DVector::from_iterator(n, prior.iter().map(|s| 1.0 / s));
+        rows.add(&DMatrix::from_diagonal(&pull), &DVector::zeros(n));
+        let batch = rows.solve()?;
+        self.alone.push(information.left + batch.left);
+        let start = State { correction: batch.x.clone(), root: batch.inverse_root.clone() };
+        let states = information.states(run, start)?;
+        if let (Some((x, sigmas)), Some(last)) = (&path.end, states.last()) {
+            let determined = |s: usize| prediction.unknowns.get(s).is_some_and(|u| u.determined_at_end);
+            let second = &mut self.second;
+            for (i, (x, sigma)) in x.iter().zip(sigmas).enumerate().filter(|(s, _)| determined(*s)) {
+                let own = last.sigma(i);
+                second.difference = second.difference.max((x - last.correction[i]).abs() / sigma);
+                second.sigma_difference = second.sigma_difference.max((own / sigma - 1.0).abs());
+            }
+        }
+        Ok(())
     }
 
     /// Factors on the sigmas, by channel.
@@ -222,6 +259,22 @@ pub(super) struct Asked {
     planned: Vec<(usize, f64)>,
 }
 
+/// Solutions that the reported numbers come from.
+struct ReportedSolutions {
+    /// Values of the unknowns, in SI.
+    values: DVector<f64>,
+    /// Solution with the prior of the scheme on everything.
+    with_prior: Solution,
+    /// Solution in which the undetermined directions count as known.
+    tight: Solution,
+    /// Solution with the platform at the attitudes of the scheme.
+    planned: Solution,
+    /// Rows of the prior calibration, which no factor changes.
+    known: DMatrix<f64>,
+    /// Factor on the standard deviations of the measurements by the fit, at least one.
+    factor: f64,
+}
+
 impl Asked {
     /// True if there is an estimate with a sigma.
     fn stands(&self) -> bool {
@@ -289,6 +342,10 @@ impl Parts<'_> {
         self.problem.step_with_prior(&self.estimate.at)
     }
 
+    /// Answer with its findings and its decisions.
+    ///
+    /// # Errors
+    /// [`CalibrationError`].
     pub(crate) fn answer(self) -> Result<Calibration, CalibrationError> {
         let weaker = self.problem.step(&self.estimate.at, 10.0 * WEAK)?;
         let at_rest = self.problem.at_rest();
@@ -299,75 +356,14 @@ impl Parts<'_> {
         }
         let determined: Vec<&Asked> = all().filter(|a| a.stands()).collect();
         let fit = self.fit(&unknowns, &combinations);
-        let with_prior = self.with_prior()?;
-        let values = match &self.bent.found {
-            Some((mean, _)) => self.problem.values(&self.problem.moved(&self.estimate.at.x, mean)),
-            None => self.problem.values(&self.estimate.at.x),
-        };
-        let solution = &self.estimate.solution;
-        let data_alone = self.problem.unknowns.stated.is_empty();
-        let tight = self.problem.step_held(&self.estimate.at, TIGHT)?;
-        let planned: At = self.problem.at(at_rest)?;
-        let planned = self.problem.step(&planned, WEAK)?;
-        let none = DMatrix::zeros(0, self.problem.unknowns.n);
-        let known = self.problem.known.as_ref().map_or(&none, |(rows, _)| rows);
-        let between = |a: &Asked, b: &Asked| {
-            let factor = fit.factor.max(1.0);
-            let covariance = solution.covariance_with(&a.local, &b.local, factor, known);
-            covariance / si_per_shown(a.unit) / si_per_shown(b.unit)
-        };
-        let estimated = |a: &Asked| {
-            let scale = si_per_shown(a.unit);
-            let there = |x: f64| a.stands().then_some(x);
-            let sigma = solution.sigma(&a.local);
-            let (linear, held) = (self.linear.sigma(&a.local), tight.sigma(&a.local));
-            let moved: f64 = a.local.iter().map(|&(i, k)| k * with_prior.x[i]).sum();
-            let open = (sigma * sigma - held * held).max(0.0).sqrt();
-            Estimated {
-                name: a.name.clone(),
-                unit: shown_unit(a.unit).into(),
-                status: a.status,
-                degree: a.degree,
-                determined: a.stands(),
-                left_open: a.left_open,
-                total: None,
-                estimate: there(a.terms.iter().map(|&(i, k)| k * values[i]).sum::<f64>() / scale),
-                sigma: there(sigma / scale),
-                sigma_rescaled: there(between(a, a).max(0.0).sqrt()),
-                predicted_sigma: there(planned.sigma(&a.planned) / scale),
-                required_sigma: self.required(&a.name),
-                held_factor: there(sigma / held),
-                open_sigma: there(open / scale),
-                from_prior: a.stands() && a.from_prior,
-                prior_shift: there(moved / linear).filter(|_| data_alone),
-                prior_factor: there(with_prior.sigma(&a.local) / linear).filter(|_| data_alone),
-            }
-        };
-        let row = |a: &Asked| {
-            let zero = nalgebra::RowDVector::zeros(solution.inverse_root.ncols());
-            let scale = si_per_shown(a.unit);
-            a.local.iter().fold(zero, |sum, &(i, k)| sum + solution.inverse_root.row(i) * (k / scale))
-        };
-        // no functional that follows from the others
-        let single = |a: &Asked| a.terms.len() == 1;
-        let follows = |a: &Asked| {
-            a.terms.iter().all(|(i, _)| determined.iter().any(|d| single(d) && d.terms[0].0 == *i))
-        };
-        let free: Vec<&Asked> = determined.iter().copied().filter(|a| single(a) || !follows(a)).collect();
-        let of: Vec<_> = free.iter().map(|a| row(a)).collect();
-        let covariance = CovarianceTable {
-            names: free.iter().map(|a| a.name.clone()).collect(),
-            units: free.iter().map(|a| shown_unit(a.unit).into()).collect(),
-            estimates: free.iter().filter_map(|a| estimated(a).estimate).collect(),
-            covariance: of.iter().map(|a| of.iter().map(|b| a.dot(b)).collect()).collect(),
-            rescaled: free.iter().map(|a| free.iter().map(|b| between(a, b)).collect()).collect(),
-        };
+        let by = self.solutions(at_rest, fit.factor.max(1.0))?;
+        let covariance = self.covariance(&determined, &by);
         let positions = self.positions(&determined)?;
         let channels = self.channels();
         let records = self.records();
         let repeatability = self.repeatability(&fit);
         let left_out = self.left_out()?;
-        let quantities: Vec<Estimated> = unknowns.iter().map(estimated).collect();
+        let quantities: Vec<Estimated> = unknowns.iter().map(|a| self.estimated(a, &by)).collect();
         let asked = (&self.conditions.bench[..], self.options.seed);
         let (omitted, outside) = omitted(self.problem, self.estimate, &quantities, self.later, asked)?;
         let mut out = Calibration {
@@ -382,7 +378,7 @@ impl Parts<'_> {
             requirements: None,
             acceptance: None,
             next_runs: Vec::new(),
-            combinations: combinations.iter().map(estimated).collect(),
+            combinations: combinations.iter().map(|a| self.estimated(a, &by)).collect(),
             covariance,
             fit,
             positions,
@@ -393,36 +389,128 @@ impl Parts<'_> {
             repeatability,
             records,
             assumed: self.assumed(&unknowns),
-            curvature: Curvature {
-                kappa: self.bent.kappa.is_finite().then_some(self.bent.kappa),
-                samples: self.bent.samples,
-                failed: self.bent.failed,
-                from_samples: self.bent.found.is_some(),
-            },
+            curvature: self.curvature(),
             setup: Setup::of(self.scheme),
             rests_on: self.rests_on.clone(),
             series: self.series(),
             residuals: self.residuals(),
         };
         out.findings = self.findings(&out, &left_out);
+        self.decide(&mut out, &outside)?;
+        Ok(out)
+    }
+
+    /// Solutions that the reported numbers come from. The platform at the attitudes of the scheme has the
+    /// states `at_rest`; `factor` is that on the standard deviations of the measurements.
+    fn solutions(
+        &self,
+        at_rest: Vec<PlatformState>,
+        factor: f64,
+    ) -> Result<ReportedSolutions, CalibrationError> {
+        let problem = self.problem;
+        let with_prior = self.with_prior()?;
+        let values = match &self.bent.found {
+            Some((mean, _)) => problem.values(&problem.moved(&self.estimate.at.x, mean)),
+            None => problem.values(&self.estimate.at.x),
+        };
+        let tight = problem.step_held(&self.estimate.at, TIGHT)?;
+        let planned: At = problem.at(at_rest)?;
+        let planned = problem.step(&planned, WEAK)?;
+        let none = || DMatrix::zeros(0, problem.unknowns.n);
+        let known = problem.known.as_ref().map_or_else(none, |(rows, _)| rows.clone());
+        Ok(ReportedSolutions { values, with_prior, tight, planned, known, factor })
+    }
+
+    /// Covariance of two functionals with the noise that the fit has, in their shown units.
+    fn between(&self, a: &Asked, b: &Asked, by: &ReportedSolutions) -> f64 {
+        let covariance = self.estimate.solution.covariance_with(&a.local, &b.local, by.factor, &by.known);
+        covariance / si_per_shown(a.unit) / si_per_shown(b.unit)
+    }
+
+    /// Estimate of a functional.
+    fn estimated(&self, a: &Asked, by: &ReportedSolutions) -> Estimated {
+        let data_alone = self.problem.unknowns.stated.is_empty();
+        let scale = si_per_shown(a.unit);
+        let there = |x: f64| a.stands().then_some(x);
+        let sigma = self.estimate.solution.sigma(&a.local);
+        let (linear, held) = (self.linear.sigma(&a.local), by.tight.sigma(&a.local));
+        let moved: f64 = a.local.iter().map(|&(i, k)| k * by.with_prior.x[i]).sum();
+        let open = (sigma * sigma - held * held).max(0.0).sqrt();
+        Estimated {
+            name: a.name.clone(),
+            unit: shown_unit(a.unit).into(),
+            status: a.status,
+            degree: a.degree,
+            determined: a.stands(),
+            left_open: a.left_open,
+            total: None,
+            estimate: there(a.terms.iter().map(|&(i, k)| k * by.values[i]).sum::<f64>() / scale),
+            sigma: there(sigma / scale),
+            sigma_rescaled: there(self.between(a, a, by).max(0.0).sqrt()),
+            predicted_sigma: there(by.planned.sigma(&a.planned) / scale),
+            required_sigma: self.required(&a.name),
+            held_factor: there(sigma / held),
+            open_sigma: there(open / scale),
+            from_prior: a.stands() && a.from_prior,
+            prior_shift: there(moved / linear).filter(|_| data_alone),
+            prior_factor: there(by.with_prior.sigma(&a.local) / linear).filter(|_| data_alone),
+        }
+    }
+
+    /// Covariance of the determined functionals that do not follow from the others.
+    fn covariance(&self, determined: &[&Asked], by: &ReportedSolutions) -> CovarianceTable {
+        let solution = &self.estimate.solution;
+        let row = |a: &Asked| {
+            let zero = nalgebra::RowDVector::zeros(solution.inverse_root.ncols());
+            let scale = si_per_shown(a.unit);
+            a.local.iter().fold(zero, |sum, &(i, k)| sum + solution.inverse_root.row(i) * (k / scale))
+        };
+        let single = |a: &Asked| a.terms.len() == 1;
+        let follows = |a: &Asked| {
+            a.terms.iter().all(|(i, _)| determined.iter().any(|d| single(d) && d.terms[0].0 == *i))
+        };
+        let free: Vec<&Asked> = determined.iter().copied().filter(|a| single(a) || !follows(a)).collect();
+        let of: Vec<_> = free.iter().map(|a| row(a)).collect();
+        CovarianceTable {
+            names: free.iter().map(|a| a.name.clone()).collect(),
+            units: free.iter().map(|a| shown_unit(a.unit).into()).collect(),
+            estimates: free.iter().filter_map(|a| self.estimated(a, by).estimate).collect(),
+            covariance: of.iter().map(|a| of.iter().map(|b| a.dot(b)).collect()).collect(),
+            rescaled: free.iter().map(|a| free.iter().map(|b| self.between(a, b, by)).collect()).collect(),
+        }
+    }
+
+    /// Test of the linear model of the covariance.
+    fn curvature(&self) -> Curvature {
+        Curvature {
+            kappa: self.bent.kappa.is_finite().then_some(self.bent.kappa),
+            samples: self.bent.samples,
+            failed: self.bent.failed,
+            from_samples: self.bent.found.is_some(),
+        }
+    }
+
+    /// Decides on requirements and acceptance by the total uncertainties, with the errors of `outside`, and
+    /// proposes further runs.
+    fn decide(&self, out: &mut Calibration, outside: &Outside) -> Result<(), CalibrationError> {
         out.consistent = out.findings.is_empty();
         for e in out.quantities.iter_mut().filter(|e| outside.adds_to(&e.name)) {
-            e.total = total(e, &outside);
+            e.total = total(e, outside);
         }
-        out.requirements = self.requirements(&out.quantities, &outside);
+        out.requirements = self.requirements(&out.quantities, outside);
         let measured = out.quantities.iter().map(|e| Measured {
             name: &e.name,
             unit: &e.unit,
             estimate: e.estimate,
-            uncertainty: total(e, &outside),
+            uncertainty: total(e, outside),
             by_prior: e.from_prior,
         });
         out.acceptance = acceptance(&self.scheme.acceptance, measured, Some(out.consistent));
         if out.requirements.as_ref().is_some_and(Requirements::all_met) {
-            out.omitted.limits = limits(&out.quantities, &outside);
+            out.omitted.limits = limits(&out.quantities, outside);
         }
-        out.next_runs = self.next_runs(&out, &outside.bench)?;
-        Ok(out)
+        out.next_runs = self.next_runs(out, &outside.bench)?;
+        Ok(())
     }
 
     /// Largest sigma allowed of a coefficient, in its unit; `None` where none is stated, and for psi.

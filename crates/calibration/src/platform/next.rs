@@ -67,12 +67,7 @@ impl Parts<'_> {
         if missed.is_empty() || self.interrupted || !self.estimate.converged {
             return Ok(Vec::new());
         }
-        let interval = self.problem.runs.iter().map(|run| run.reading.interval).fold(f64::INFINITY, f64::min);
-        let factor = of.fit.factor.max(1.0);
-        let variances = self.problem.sigmas.iter().map(|s| s * s * factor * factor * interval).collect();
-        let rescaled = of.covariance.rescaled.clone();
-        let table = CovarianceTable { covariance: rescaled, ..of.covariance.clone() };
-        let further = Further { parts: self, table, variances };
+        let further = self.further(of);
         let dwells =
             self.scheme.positions.iter().map(|p| p.dwell.map_or(self.conditions.dwell_s, |d| d.seconds()));
         let dwell = dwells.fold(0.0, f64::max);
@@ -84,39 +79,52 @@ impl Parts<'_> {
             sigmas.push((angles, missed.iter().map(|(e, _)| further.sigma(&solution, &e.name)).collect()));
         }
         let mut out = Vec::new();
-        for (k, (e, required)) in missed.iter().enumerate() {
+        for (k, &(e, required)) in missed.iter().enumerate() {
             // the contribution of the bench exceeds the requirement: no run helps
-            if *required == 0.0 {
-                out.push(NextRun {
-                    unknown: e.name.clone(),
-                    unit: e.unit.clone(),
-                    sigma: e.sigma_rescaled,
-                    required_sigma: 0.0,
-                    attitude: None,
-                    dwell_s: None,
-                    sigma_then: None,
-                    met: false,
-                });
+            if required == 0.0 {
+                out.push(no_run(e));
                 continue;
             }
             let Some((angles, own)) = sigmas.iter().min_by(|a, b| a.1[k].total_cmp(&b.1[k])) else {
                 continue;
             };
             let name = all.iter().find(|(_, a)| a == *angles).map_or_else(String::new, |(n, _)| n.clone());
-            let (dwell_s, sigma) = further.dwell(angles, &e.name, *required, (dwell, own[k]))?;
+            let (dwell_s, sigma) = further.dwell(angles, &e.name, required, (dwell, own[k]))?;
             let improves = e.sigma_rescaled.is_none_or(|s| sigma < 0.99 * s) && sigma.is_finite();
             out.push(NextRun {
-                unknown: e.name.clone(),
-                unit: e.unit.clone(),
-                sigma: e.sigma_rescaled,
-                required_sigma: *required,
+                required_sigma: required,
                 attitude: improves.then_some(name),
                 dwell_s: improves.then_some(dwell_s),
                 sigma_then: improves.then_some(sigma),
-                met: sigma <= *required,
+                met: sigma <= required,
+                ..no_run(e)
             });
         }
         Ok(out)
+    }
+
+    /// Conditions of a further run after the answer `of`.
+    fn further(&self, of: &Calibration) -> Further<'_, '_> {
+        let interval = self.problem.runs.iter().map(|run| run.reading.interval).fold(f64::INFINITY, f64::min);
+        let factor = of.fit.factor.max(1.0);
+        let variances = self.problem.sigmas.iter().map(|s| s * s * factor * factor * interval).collect();
+        let rescaled = of.covariance.rescaled.clone();
+        let table = CovarianceTable { covariance: rescaled, ..of.covariance.clone() };
+        Further { parts: self, table, variances }
+    }
+}
+
+/// No further run for a coefficient, whose requirement no run meets.
+fn no_run(e: &Estimated) -> NextRun {
+    NextRun {
+        unknown: e.name.clone(),
+        unit: e.unit.clone(),
+        sigma: e.sigma_rescaled,
+        required_sigma: 0.0,
+        attitude: None,
+        dwell_s: None,
+        sigma_then: None,
+        met: false,
     }
 }
 

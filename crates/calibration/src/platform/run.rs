@@ -1,15 +1,21 @@
 //! Record of one run on its own timeline: the scheme with the times of the record, linearised along a
 //! trajectory.
 
+use std::iter::Peekable;
+
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Dwell, Scheme};
-use obsdeg_ekf::{EkfError, Manifold, Measurement, Motion, ProcessNoise, ScalarOutput, Stage, Update};
-use obsdeg_evidence::simulation::{Conditions, Extended, Plan, PlatformState, Segment, SegmentKind, Tilt};
+use obsdeg_ekf::{
+    EkfError, Manifold, Measurement, Motion, ProcessNoise, ScalarOutput, Stage, Transition, Update,
+};
+use obsdeg_evidence::simulation::{
+    Conditions, Extended, Plan, PlatformMotion, PlatformState, Segment, SegmentKind, Tilt,
+};
 
 use super::CalibrationError;
 use super::clock::words;
-use super::placed::{By, Reading};
+use super::placed::Reading;
 use super::timeline::slews;
 use crate::bins::{Bin, Mean};
 use crate::least_squares::Linearised;
@@ -69,7 +75,7 @@ fn rate(motion: &impl Motion<PlatformState>, x: &PlatformState) -> Result<Vec<f6
 
 /// Second derivatives of the outputs at a position, in units of the outputs per s^2, and the time of the run
 /// until which they are used, in s.
-struct Bent {
+struct SecondDerivatives {
     position: usize,
     until: f64,
     values: Vec<f64>,
@@ -138,6 +144,85 @@ fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
     out
 }
 
+/// Lengths of the intervals in which the rows leave open when each position begins, in s. Ends of `stays` move
+/// to their middles.
+fn open_ends(reading: &Reading, stays: &mut [(f64, f64)], slews: &[f64]) -> Vec<f64> {
+    let mut open = vec![0.0; reading.bins.len()];
+    if reading.ends_open {
+        // the platform leaves a position at any time between its last row and the latest time from which
+        // the slew takes it to the next position before the first row there: on average in the middle
+        for p in 1..stays.len() {
+            open[p] = (stays[p].0 - stays[p - 1].1 - slews[p]).max(0.0);
+            stays[p - 1].1 += open[p] / 2.0;
+        }
+    }
+    open
+}
+
+/// Sets the dwells of the positions of `own` and their beginnings (s) to those of the record. The platform
+/// spends the rest of a gap without slew at the next position.
+///
+/// # Errors
+/// [`CalibrationError::Slew`].
+fn dwell_as_recorded(
+    reading: &Reading,
+    stays: &[(f64, f64)],
+    slews: &[f64],
+    planned: &Plan,
+    own: &mut Scheme,
+    begins: &mut [f64],
+) -> Result<(), CalibrationError> {
+    let mut left = 0.0;
+    for (p, position) in own.positions.iter_mut().enumerate() {
+        let turned = slews[p];
+        let (first, last) = stays[p];
+        begins[p] = left + turned;
+        if begins[p] > first {
+            return Err(CalibrationError::Slew {
+                record: reading.name.clone(),
+                position: position.name.clone(),
+                gap_s: first - left,
+                slew_s: turned,
+                clock: reading
+                    .by_durations(planned)
+                    .map_or_else(String::new, |rate| format!("; positions lie as by {}", words(rate.fast))),
+            });
+        }
+        let dwell = (last - begins[p]).max(2.0 * CLOSEST * (1.0 + reading.bins[p].len() as f64));
+        position.dwell = Dwell::from_seconds(dwell);
+        left = begins[p] + dwell;
+    }
+    Ok(())
+}
+
+/// Bin at the end of each segment of a plan, as (position, index), and the changes of position, each of which
+/// is `open` by some time (s).
+fn bins_of_segments(
+    plan: &Plan,
+    reading: &Reading,
+    open: &[f64],
+) -> (Vec<Option<(usize, usize)>>, Vec<Change>) {
+    let mut seen = vec![0; open.len()];
+    let mut bins = Vec::with_capacity(plan.segments.len());
+    let mut changes: Vec<Change> = Vec::new();
+    for (k, s) in plan.segments.iter().enumerate() {
+        let next = seen[s.position];
+        let at_rest = !matches!(s.kind, SegmentKind::Slew(_));
+        let there = at_rest && next < reading.bins[s.position].len();
+        let from = changes.last().map_or(0, |c| c.begin);
+        if at_rest && s.position > plan.segments[from].position {
+            // an attitude of its own begins where the position does
+            let carried = plan.psi_columns(from) == plan.psi_columns(k);
+            let open = if carried { open[s.position] } else { 0.0 };
+            changes.push(Change { to: s.position, begin: k, open });
+        }
+        bins.push(there.then_some((s.position, next)));
+        seen[s.position] += usize::from(there);
+    }
+    changes.retain(|c| c.open > CLOSEST);
+    (bins, changes)
+}
+
 impl Run {
     /// Places a reading on the timeline of `scheme`, whose own plan is `planned`: positions begin and end as
     /// in the record.
@@ -151,41 +236,12 @@ impl Run {
         conditions: &Conditions,
     ) -> Result<Self, CalibrationError> {
         let mut own = scheme.clone();
-        let mut begins = vec![0.0; own.positions.len()];
         let mut stays = reading.stays.clone();
         let slews = slews(planned);
-        let slew_s = |p: usize| slews[p];
-        let mut open = vec![0.0; own.positions.len()];
-        if reading.ends_open {
-            // the platform leaves a position at any time between its last row and the latest time from which
-            // the slew takes it to the next position before the first row there: on average in the middle
-            for p in 1..stays.len() {
-                open[p] = (stays[p].0 - stays[p - 1].1 - slew_s(p)).max(0.0);
-                stays[p - 1].1 += open[p] / 2.0;
-            }
-        }
-        if matches!(reading.by, By::Label | By::Static) {
-            // the platform spends the rest of a gap without slew at the next position
-            let mut left = 0.0;
-            for (p, position) in own.positions.iter_mut().enumerate() {
-                let turned = slew_s(p);
-                let (first, last) = stays[p];
-                begins[p] = left + turned;
-                if begins[p] > first {
-                    return Err(CalibrationError::Slew {
-                        record: reading.name.clone(),
-                        position: position.name.clone(),
-                        gap_s: first - left,
-                        slew_s: turned,
-                        clock: reading.by_durations(planned).map_or_else(String::new, |rate| {
-                            format!("; positions lie as by {}", words(rate.fast))
-                        }),
-                    });
-                }
-                let dwell = (last - begins[p]).max(2.0 * CLOSEST * (1.0 + reading.bins[p].len() as f64));
-                position.dwell = Dwell::from_seconds(dwell);
-                left = begins[p] + dwell;
-            }
+        let open = open_ends(&reading, &mut stays, &slews);
+        let mut begins = vec![0.0; own.positions.len()];
+        if reading.by.own_time() {
+            dwell_as_recorded(&reading, &stays, &slews, planned, &mut own, &mut begins)?;
         }
         let plan = Plan::derived(&own, conditions)?;
         for s in &plan.segments {
@@ -195,26 +251,9 @@ impl Run {
         }
         let of = |s: &Segment| parts(&reading.bins[s.position], begins[s.position], s.steps as f64 * s.dt);
         let plan = plan.in_steps(conditions, of)?;
-        let mut seen = vec![0; own.positions.len()];
-        let mut bins = Vec::with_capacity(plan.segments.len());
-        let mut changes: Vec<Change> = Vec::new();
-        for (k, s) in plan.segments.iter().enumerate() {
-            let next = seen[s.position];
-            let at_rest = !matches!(s.kind, SegmentKind::Slew(_));
-            let there = at_rest && next < reading.bins[s.position].len();
-            let from = changes.last().map_or(0, |c| c.begin);
-            if at_rest && s.position > plan.segments[from].position {
-                // an attitude of its own begins where the position does
-                let carried = plan.psi_columns(from) == plan.psi_columns(k);
-                let open = if carried { open[s.position] } else { 0.0 };
-                changes.push(Change { to: s.position, begin: k, open });
-            }
-            bins.push(there.then_some((s.position, next)));
-            seen[s.position] += usize::from(there);
-        }
+        let (bins, changes) = bins_of_segments(&plan, &reading, &open);
         let all = bins.iter().flatten().count();
         let counts = vec![vec![true; plan.components.len()]; all];
-        changes.retain(|c| c.open > CLOSEST);
         Ok(Self { reading, plan, bins, counts, changes })
     }
 
@@ -275,76 +314,136 @@ impl Run {
         nodes: &[(usize, PlatformState)],
     ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
         let filter = Extended::new(&self.plan, conditions, Update::default())?;
-        let (plan, n) = (&self.plan, self.plan.states());
-        let (mut out, mut keys) = (Linearised::default(), Vec::new());
-        let (mut x, mut bin) = (x0.clone(), 0);
+        let mut out = Linearised::default();
+        let mut along = RunLinearisation::new(self, sigmas, &filter, x0);
         let mut nodes = nodes.iter().peekable();
-        let (mut now, mut second) = (0.0, None::<Bent>);
-        let (mut changes, mut drift, mut scratch) = (self.changes.iter().peekable(), Vec::new(), Vec::new());
-        for (segment, s) in plan.segments.iter().enumerate() {
+        for (segment, s) in self.plan.segments.iter().enumerate() {
             let motion = filter.motion(segment);
             if let Some((_, node)) = nodes.next_if(|(at, _)| *at == segment) {
-                let begins = x.clone().with_attitude_of(motion.block(), node);
-                out.gaps.push((segment.saturating_sub(1), DVector::from_vec(x.local(&begins))));
-                x = begins;
+                let begins = along.x.clone().with_attitude_of(motion.block(), node);
+                out.gaps.push((segment.saturating_sub(1), DVector::from_vec(along.x.local(&begins))));
+                along.x = begins;
             }
-            let (transition, noise) = motion.advance(0.0, s.dt, &mut x)?;
-            now += s.dt;
-            let mut outputs = Vec::new();
-            if let Some((position, i)) = self.bins[segment] {
-                let channels = &self.reading.bins[position][i].channels;
-                let bent = channels.iter().zip(sigmas).any(|(mean, sigma)| {
-                    let bends = |m: &Mean| {
-                        m.bend * BENDS > FLAT * m.variance.sqrt() * if m.given { 1.0 } else { *sigma }
-                    };
-                    mean.as_ref().is_some_and(bends)
-                });
-                let steady = |b: &Bent| b.position == position && b.until >= now;
-                if bent && !second.as_ref().is_some_and(steady) {
-                    second = Some(Bent { position, until: now + STEADY_S, values: bend(&motion, &x)? });
-                }
-                let bend = |channel: usize| match &second {
-                    Some(b) if bent => b.values[channel],
-                    _ => 0.0,
-                };
-                let (h, rows) = (motion.h(0.0, &x), Measurement::jacobian(&motion, 0.0, &x));
-                for (channel, mean) in channels.iter().enumerate() {
-                    let Some(mean) = mean.filter(|_| self.counts[bin][channel]) else { continue };
-                    let row = rows.row(channel);
-                    let h_of = row.iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect();
-                    let r = mean.variance * if mean.given { 1.0 } else { sigmas[channel] * sigmas[channel] };
-                    outputs.push(ScalarOutput { h: h_of, r });
-                    out.residuals.push(mean.value - h[channel] - bend(channel) * mean.bend);
-                    keys.push(Key { position, bin, channel });
-                }
-                bin += 1;
-            }
-            let (mut root, mut noise) = (noise_root(plan, segment, n), noise.into_owned());
-            // a change that is later by some time adds the drift before it, carried through the slew, and
-            // takes away that behind it
-            if let Some(change) = changes.peek() {
-                let next = segment + 1;
-                if s.position < change.to && plan.segments[next].position == change.to {
-                    drift = rate(&motion, &x)?;
-                } else if s.position == change.to {
-                    transition.apply(&mut drift, &mut scratch);
-                }
-                if next == change.begin {
-                    let behind = rate(&filter.motion(next), &x)?;
-                    drift.iter_mut().zip(behind).for_each(|(d, b)| *d -= b);
-                    root = with_change(root, &drift, change.open);
-                    noise = ProcessNoise::new(&(&root * root.transpose()))?;
-                    changes.next();
-                }
-            }
+            let (transition, noise) = motion.advance(0.0, s.dt, &mut along.x)?;
+            along.now += s.dt;
+            let outputs = along.outputs(segment, &motion)?;
+            let (root, noise) = along.noise(segment, &motion, &transition, noise.into_owned())?;
             out.roots.push(root);
             out.stages.push(Stage { transition, noise, outputs, steps: 1 });
         }
+        out.residuals = along.residuals;
         if let Some(k) = out.residuals.iter().position(|x| !x.is_finite()) {
             let value = out.residuals[k];
             return Err(EkfError::NotFinite { what: "the residuals", value, row: k, column: 0 }.into());
         }
-        Ok((out, keys))
+        Ok((out, along.keys))
+    }
+}
+
+/// Linearisation of a run, segment by segment.
+struct RunLinearisation<'a> {
+    run: &'a Run,
+    /// Standard deviations of a sample, by channel.
+    sigmas: &'a [f64],
+    filter: &'a Extended<'a>,
+    /// State of the trajectory, and its time in s.
+    x: PlatformState,
+    now: f64,
+    /// Index of the next bin.
+    bin: usize,
+    residuals: Vec<f64>,
+    keys: Vec<Key>,
+    second: Option<SecondDerivatives>,
+    /// Changes of position that follow, and the drift (1/s) before the next, carried to the trajectory's time.
+    changes: Peekable<std::slice::Iter<'a, Change>>,
+    drift: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl<'a> RunLinearisation<'a> {
+    /// Linearisation before the first segment, from `x0`.
+    fn new(run: &'a Run, sigmas: &'a [f64], filter: &'a Extended<'a>, x0: &PlatformState) -> Self {
+        Self {
+            run,
+            sigmas,
+            filter,
+            x: x0.clone(),
+            now: 0.0,
+            bin: 0,
+            residuals: Vec::new(),
+            keys: Vec::new(),
+            second: None,
+            changes: run.changes.iter().peekable(),
+            drift: Vec::new(),
+            scratch: Vec::new(),
+        }
+    }
+
+    /// Rows of the measurements that count at the end of a segment.
+    fn outputs(
+        &mut self,
+        segment: usize,
+        motion: &PlatformMotion<'_>,
+    ) -> Result<Vec<ScalarOutput>, EkfError> {
+        let (run, sigmas, now, bin) = (self.run, self.sigmas, self.now, self.bin);
+        let mut outputs = Vec::new();
+        let Some((position, i)) = run.bins[segment] else { return Ok(outputs) };
+        let channels = &run.reading.bins[position][i].channels;
+        let bent = channels.iter().zip(sigmas).any(|(mean, sigma)| {
+            let bends =
+                |m: &Mean| m.bend * BENDS > FLAT * m.variance.sqrt() * if m.given { 1.0 } else { *sigma };
+            mean.as_ref().is_some_and(bends)
+        });
+        let steady = |b: &SecondDerivatives| b.position == position && b.until >= now;
+        if bent && !self.second.as_ref().is_some_and(steady) {
+            let values = bend(motion, &self.x)?;
+            self.second = Some(SecondDerivatives { position, until: now + STEADY_S, values });
+        }
+        let (h, rows) = (motion.h(0.0, &self.x), Measurement::jacobian(motion, 0.0, &self.x));
+        for (channel, mean) in channels.iter().enumerate() {
+            let Some(mean) = mean.filter(|_| run.counts[bin][channel]) else { continue };
+            let row = rows.row(channel);
+            let h_of = row.iter().copied().enumerate().filter(|(_, c)| *c != 0.0).collect();
+            let r = mean.variance * if mean.given { 1.0 } else { sigmas[channel] * sigmas[channel] };
+            outputs.push(ScalarOutput { h: h_of, r });
+            let bend = match &self.second {
+                Some(b) if bent => b.values[channel],
+                _ => 0.0,
+            };
+            self.residuals.push(mean.value - h[channel] - bend * mean.bend);
+            self.keys.push(Key { position, bin, channel });
+        }
+        self.bin += 1;
+        Ok(outputs)
+    }
+
+    /// Noise of a segment with its root. A change of position that is later by some time adds the drift before
+    /// it, carried through the slew, and takes away that behind it.
+    fn noise(
+        &mut self,
+        segment: usize,
+        motion: &PlatformMotion<'_>,
+        transition: &Transition,
+        noise: ProcessNoise,
+    ) -> Result<(DMatrix<f64>, ProcessNoise), EkfError> {
+        let plan = &self.run.plan;
+        let root = noise_root(plan, segment, plan.states());
+        let Some(&&change) = self.changes.peek() else { return Ok((root, noise)) };
+        let (position, next) = (plan.segments[segment].position, segment + 1);
+        if position < change.to && plan.segments[next].position == change.to {
+            self.drift = rate(motion, &self.x)?;
+        } else if position == change.to {
+            transition.apply(&mut self.drift, &mut self.scratch);
+        }
+        if next != change.begin {
+            return Ok((root, noise));
+        }
+        let behind = rate(&self.filter.motion(next), &self.x)?;
+        self.drift.iter_mut().zip(behind).for_each(|(d, b)| *d -= b);
+        let root = with_change(root, &self.drift, change.open);
+        let noise = ProcessNoise::new(&(&root * root.transpose()))?;
+        self.changes.next();
+        Ok((root, noise))
     }
 }
 
