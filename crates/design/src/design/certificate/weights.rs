@@ -56,7 +56,7 @@ struct BarrierPoint {
 }
 
 /// First and second derivatives of the part of the barrier function that depends on the objective.
-struct Slopes {
+struct BarrierSlopes {
     /// Gradient with respect to the weights (shape n).
     gradient: Vec<f64>,
     /// Hessian with respect to the weights (n x n); s is at its minimum for the weights.
@@ -381,16 +381,7 @@ impl<'a> WeightProblem<'a> {
         if !(decrement.is_finite() && decrement > 0.0) {
             return None;
         }
-        // Newton's step of the multipliers, shortened so that they stay positive
-        let steps: Vec<f64> = multipliers
-            .iter()
-            .zip(w.iter())
-            .zip(y.iter())
-            .map(|((z, w), y)| 1.0 / w - z * (1.0 + y))
-            .collect();
-        let deepest = multipliers.iter().zip(&steps).map(|(z, d)| -d / z).fold(0.0, f64::max);
-        let follow = if deepest > 0.0 { (INSIDE / deepest).min(1.0) } else { 1.0 };
-        multipliers.iter_mut().zip(&steps).for_each(|(z, d)| *z += follow * d);
+        follow(multipliers, w, &y);
         let logs = |w: &[f64]| w.iter().map(|w| w.ln()).sum::<f64>();
         let before = here.value - logs(w);
         let deepest = y.iter().fold(0.0f64, |m, y| m.max(-y));
@@ -413,106 +404,126 @@ impl<'a> WeightProblem<'a> {
 
     /// Gradient and Hessian of [`Self::at`] with respect to the weights, and to s where the objective
     /// has it.
-    fn slopes(&self, root: &Cholesky<f64, Dyn>, w: &[f64], tau: f64, scale: f64) -> Option<Slopes> {
-        let (n, problem) = (w.len(), self.problem);
-        let inverse = root.inverse();
-        // F_i M^-1
-        let through: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &inverse).collect();
-        let pair = |i: usize, j: usize| &through[i] * self.factors[j].transpose();
-        let symmetric = |entry: &dyn Fn(usize, usize) -> f64| {
-            let mut h = DMatrix::zeros(n, n);
-            for i in 0..n {
-                for j in 0..=i {
-                    let x = entry(i, j);
-                    (h[(i, j)], h[(j, i)]) = (x, x);
-                }
-            }
-            h
-        };
-        Some(match &problem.objective {
-            Objective::Volume => {
-                let d = problem.counting() as f64;
-                let nuisance = problem.nuisance;
-                // from the information on the nuisance alone
-                let root = (nuisance > 0)
-                    .then(|| self.information(w).view((0, 0), (nuisance, nuisance)).into_owned().cholesky());
-                let inner = root.flatten().map(|r| r.inverse());
-                let corner = |i: usize| self.factors[i].columns(0, nuisance);
-                let own: Vec<DMatrix<f64>> = (0..n)
-                    .map(|i| inner.as_ref().map_or_else(|| DMatrix::zeros(0, 0), |v| corner(i) * v))
-                    .collect();
-                let hidden = |i: usize, j: usize| match inner {
-                    Some(_) => &own[i] * corner(j).transpose(),
-                    None => DMatrix::zeros(self.factors[i].nrows(), self.factors[j].nrows()),
-                };
-                let gradient =
-                    (0..n).map(|i| tau / d * (hidden(i, i).trace() - pair(i, i).trace())).collect();
-                let entry =
-                    |i: usize, j: usize| tau / d * (pair(i, j).norm_squared() - hidden(i, j).norm_squared());
-                Slopes { gradient, hessian: symmetric(&entry), by_s: None }
-            }
-            Objective::Least => {
-                // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on the unknowns
-                // that count
-                let r = root
-                    .l()
-                    .transpose()
-                    .solve_upper_triangular(&DMatrix::identity(problem.unknowns(), problem.unknowns()));
-                let r = r.unwrap_or_else(|| DMatrix::zeros(problem.unknowns(), problem.unknowns()));
-                let counting = r.rows(problem.nuisance, problem.counting());
-                let unit = counting.transpose() * counting;
-                let of: Vec<DMatrix<f64>> =
-                    self.factors.iter().map(|f| f * &r).map(|f| f.transpose() * f).collect();
-                let curvature = unit.norm_squared();
-                let follows: Vec<f64> = of.iter().map(|x| x.dot(&unit) / curvature).collect();
-                let rest: Vec<DMatrix<f64>> = of.iter().zip(&follows).map(|(x, c)| x - &unit * *c).collect();
-                Slopes {
-                    gradient: of.iter().map(|x| -x.trace()).collect(),
-                    hessian: symmetric(&|i, j| rest[i].dot(&rest[j])),
-                    by_s: Some(ByS { gradient: unit.trace() - tau / scale, curvature, follows }),
-                }
-            }
-            Objective::Mean(vectors) => {
-                let factor = tau / scale / vectors.ncols() as f64;
-                let (u, _) = self.solved(root);
-                let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
-                let gradient = (0..n).map(|i| -factor * seen[i].norm_squared()).collect();
-                let entry =
-                    |i: usize, j: usize| 2.0 * factor * pair(i, j).dot(&(&seen[i] * seen[j].transpose()));
-                Slopes { gradient, hessian: symmetric(&entry), by_s: None }
-            }
-            Objective::Largest(_, offsets) => {
-                let (u, values) = self.solved(root);
-                let shares = multipliers_of(&slacks_of(&values, offsets, tau / scale)?.1);
-                let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
-                let weighted: Vec<DMatrix<f64>> = seen
-                    .iter()
-                    .map(|x| DMatrix::from_fn(x.nrows(), x.ncols(), |r, j| x[(r, j)] * shares[j]))
-                    .collect();
-                // share_j times the slope of v_j by the weights relative to the slope of s, which
-                // follows their mean
-                let slope = |i: usize, j: usize| -seen[i].column(j).norm_squared();
-                let slopes = DMatrix::from_fn(n, shares.len(), slope);
-                let weighed = |row: usize, by: &dyn Fn(f64) -> f64| -> f64 {
-                    slopes.row(row).iter().zip(&shares).map(|(x, share)| x * by(*share)).sum()
-                };
-                let curvature: f64 = shares.iter().map(|x| x * x).sum();
-                let follows: Vec<f64> = (0..n).map(|i| weighed(i, &|x| x * x) / curvature).collect();
-                let rest = |i: usize, j: usize| shares[j] * (slopes[(i, j)] - follows[i]);
-                let rest = DMatrix::from_fn(n, shares.len(), rest);
-                let outer = &rest * rest.transpose();
-                let entry = |i: usize, j: usize| {
-                    outer[(i, j)] + 2.0 * pair(i, j).dot(&(&weighted[i] * seen[j].transpose()))
-                };
-                // s is at its minimum for the weights
-                Slopes {
-                    gradient: (0..n).map(|i| weighed(i, &|x| x)).collect(),
-                    hessian: symmetric(&entry),
-                    by_s: None,
-                }
-            }
-        })
+    fn slopes(&self, root: &Cholesky<f64, Dyn>, w: &[f64], tau: f64, scale: f64) -> Option<BarrierSlopes> {
+        match &self.problem.objective {
+            Objective::Volume => Some(self.slopes_of_volume(root, w, tau)),
+            Objective::Least => Some(self.slopes_of_least(root, tau / scale)),
+            Objective::Mean(vectors) => Some(self.slopes_of_mean(root, vectors.ncols(), tau / scale)),
+            Objective::Largest(_, offsets) => self.slopes_of_largest(root, offsets, tau / scale),
+        }
     }
+
+    /// `F_i M^-1` of every candidate.
+    fn through(&self, root: &Cholesky<f64, Dyn>) -> Vec<DMatrix<f64>> {
+        let inverse = root.inverse();
+        self.factors.iter().map(|f| f * &inverse).collect()
+    }
+
+    /// Slopes for the objective [`Objective::Volume`].
+    fn slopes_of_volume(&self, root: &Cholesky<f64, Dyn>, w: &[f64], tau: f64) -> BarrierSlopes {
+        let (n, problem) = (w.len(), self.problem);
+        let through = self.through(root);
+        let pair = |i: usize, j: usize| &through[i] * self.factors[j].transpose();
+        let d = problem.counting() as f64;
+        let nuisance = problem.nuisance;
+        // from the information on the nuisance alone
+        let root = (nuisance > 0)
+            .then(|| self.information(w).view((0, 0), (nuisance, nuisance)).into_owned().cholesky());
+        let inner = root.flatten().map(|r| r.inverse());
+        let corner = |i: usize| self.factors[i].columns(0, nuisance);
+        let own: Vec<DMatrix<f64>> =
+            (0..n).map(|i| inner.as_ref().map_or_else(|| DMatrix::zeros(0, 0), |v| corner(i) * v)).collect();
+        let hidden = |i: usize, j: usize| match inner {
+            Some(_) => &own[i] * corner(j).transpose(),
+            None => DMatrix::zeros(self.factors[i].nrows(), self.factors[j].nrows()),
+        };
+        let gradient = (0..n).map(|i| tau / d * (hidden(i, i).trace() - pair(i, i).trace())).collect();
+        let entry = |i: usize, j: usize| tau / d * (pair(i, j).norm_squared() - hidden(i, j).norm_squared());
+        BarrierSlopes { gradient, hessian: symmetric(n, &entry), by_s: None }
+    }
+
+    /// Slopes for the objective [`Objective::Least`].
+    fn slopes_of_least(&self, root: &Cholesky<f64, Dyn>, rate: f64) -> BarrierSlopes {
+        let problem = self.problem;
+        // with Z = R R^T: R^T A_i R as vectors, and R^T P R, P the unit matrix on the unknowns
+        // that count
+        let r = root
+            .l()
+            .transpose()
+            .solve_upper_triangular(&DMatrix::identity(problem.unknowns(), problem.unknowns()));
+        let r = r.unwrap_or_else(|| DMatrix::zeros(problem.unknowns(), problem.unknowns()));
+        let counting = r.rows(problem.nuisance, problem.counting());
+        let unit = counting.transpose() * counting;
+        let of: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &r).map(|f| f.transpose() * f).collect();
+        let curvature = unit.norm_squared();
+        let follows: Vec<f64> = of.iter().map(|x| x.dot(&unit) / curvature).collect();
+        let rest: Vec<DMatrix<f64>> = of.iter().zip(&follows).map(|(x, c)| x - &unit * *c).collect();
+        BarrierSlopes {
+            gradient: of.iter().map(|x| -x.trace()).collect(),
+            hessian: symmetric(self.factors.len(), &|i, j| rest[i].dot(&rest[j])),
+            by_s: Some(ByS { gradient: unit.trace() - rate, curvature, follows }),
+        }
+    }
+
+    /// Slopes for the objective [`Objective::Mean`] over `count` columns.
+    fn slopes_of_mean(&self, root: &Cholesky<f64, Dyn>, count: usize, rate: f64) -> BarrierSlopes {
+        let n = self.factors.len();
+        let through = self.through(root);
+        let pair = |i: usize, j: usize| &through[i] * self.factors[j].transpose();
+        let factor = rate / count as f64;
+        let (u, _) = self.solved(root);
+        let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
+        let gradient = (0..n).map(|i| -factor * seen[i].norm_squared()).collect();
+        let entry = |i: usize, j: usize| 2.0 * factor * pair(i, j).dot(&(&seen[i] * seen[j].transpose()));
+        BarrierSlopes { gradient, hessian: symmetric(n, &entry), by_s: None }
+    }
+
+    /// Slopes for the objective [`Objective::Largest`]; s is at its minimum for the weights.
+    fn slopes_of_largest(
+        &self,
+        root: &Cholesky<f64, Dyn>,
+        offsets: &[f64],
+        rate: f64,
+    ) -> Option<BarrierSlopes> {
+        let n = self.factors.len();
+        let through = self.through(root);
+        let pair = |i: usize, j: usize| &through[i] * self.factors[j].transpose();
+        let (u, values) = self.solved(root);
+        let shares = multipliers_of(&slacks_of(&values, offsets, rate)?.1);
+        let seen: Vec<DMatrix<f64>> = self.factors.iter().map(|f| f * &u).collect();
+        let weighted: Vec<DMatrix<f64>> = seen
+            .iter()
+            .map(|x| DMatrix::from_fn(x.nrows(), x.ncols(), |r, j| x[(r, j)] * shares[j]))
+            .collect();
+        // share_j times the slope of v_j by the weights relative to the slope of s, which
+        // follows their mean
+        let slope = |i: usize, j: usize| -seen[i].column(j).norm_squared();
+        let slopes = DMatrix::from_fn(n, shares.len(), slope);
+        let weighed = |row: usize, by: &dyn Fn(f64) -> f64| -> f64 {
+            slopes.row(row).iter().zip(&shares).map(|(x, share)| x * by(*share)).sum()
+        };
+        let curvature: f64 = shares.iter().map(|x| x * x).sum();
+        let follows: Vec<f64> = (0..n).map(|i| weighed(i, &|x| x * x) / curvature).collect();
+        let rest = |i: usize, j: usize| shares[j] * (slopes[(i, j)] - follows[i]);
+        let rest = DMatrix::from_fn(n, shares.len(), rest);
+        let outer = &rest * rest.transpose();
+        let entry =
+            |i: usize, j: usize| outer[(i, j)] + 2.0 * pair(i, j).dot(&(&weighted[i] * seen[j].transpose()));
+        let gradient = (0..n).map(|i| weighed(i, &|x| x)).collect();
+        Some(BarrierSlopes { gradient, hessian: symmetric(n, &entry), by_s: None })
+    }
+}
+
+/// Symmetric matrix (n x n) of these entries.
+fn symmetric(n: usize, entry: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64> {
+    let mut h = DMatrix::zeros(n, n);
+    for i in 0..n {
+        for j in 0..=i {
+            let x = entry(i, j);
+            (h[(i, j)], h[(j, i)]) = (x, x);
+        }
+    }
+    h
 }
 
 /// Minimum over s of `rate s - sum_j ln(s - o_j - v_j)`: s, and the distance of each `o_j + v_j` below
@@ -533,6 +544,16 @@ fn slacks_of(values: &[f64], offsets: &[f64], rate: f64) -> Option<(f64, Vec<f64
     }
     let left: Vec<f64> = totals.iter().map(|a| above + (largest - a)).collect();
     (largest.is_finite() && left.iter().all(|x| *x > 0.0)).then_some((largest + above, left))
+}
+
+/// Newton's step of the multipliers for the relative step `y` of the weights, shortened so that they stay
+/// positive.
+fn follow(multipliers: &mut [f64], w: &[f64], y: &DVector<f64>) {
+    let steps: Vec<f64> =
+        multipliers.iter().zip(w.iter()).zip(y.iter()).map(|((z, w), y)| 1.0 / w - z * (1.0 + y)).collect();
+    let deepest = multipliers.iter().zip(&steps).map(|(z, d)| -d / z).fold(0.0, f64::max);
+    let part = if deepest > 0.0 { (INSIDE / deepest).min(1.0) } else { 1.0 };
+    multipliers.iter_mut().zip(&steps).for_each(|(z, d)| *z += part * d);
 }
 
 fn multipliers_of(left: &[f64]) -> Vec<f64> {
@@ -608,7 +629,7 @@ mod tests {
             let (tau, unit) = (7.0, 1.3);
             let root = weighing.at(&w, s, tau, unit).expect("inside").root;
             // with s as a sixth variable
-            let whole = |slopes: Slopes| {
+            let whole = |slopes: BarrierSlopes| {
                 let n = slopes.gradient.len();
                 let (mut gradient, mut h) = (slopes.gradient, slopes.hessian);
                 if let Some(by) = slopes.by_s {

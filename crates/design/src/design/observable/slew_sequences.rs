@@ -7,6 +7,7 @@
 //! even six more rows in every further position are not enough. A sequence that is found is exact for
 //! any prime; the statement that no shorter one exists has a stated error bound.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use obsdeg_core::degree::{EnsembleError, local_chain};
@@ -190,9 +191,96 @@ struct SequenceSearch {
     required: Vec<usize>,
     /// Largest number of rows that a position adds.
     most: usize,
+    /// Order of the roots of unity in the fields.
+    order: u64,
 }
 
 impl SequenceSearch {
+    /// Search over the candidates that a tour visits; `neighbours` are the candidates that one turn leads to.
+    ///
+    /// # Errors
+    /// [`DesignError`] if no random point was found.
+    fn new(
+        platform: &Platform,
+        tour: &[usize],
+        neighbours: &[Vec<usize>],
+        required: Vec<usize>,
+        seed: u64,
+    ) -> Result<Self, DesignError> {
+        let visit = |c: usize| tour.iter().position(|x| *x == c).unwrap_or(0);
+        let first_visit: Vec<usize> = (0..neighbours.len()).map(visit).collect();
+        let place = |from: usize, to: usize| tour.windows(2).position(|w| w == [from, to]).map(|i| i + 1);
+        let pairs =
+            neighbours.iter().enumerate().flat_map(|(from, list)| list.iter().map(move |to| (from, *to)));
+        let turn_at: Vec<usize> = pairs.filter_map(|(from, to)| place(from, to)).collect();
+        let mut number = 0;
+        let mut numbered = |to: &usize| {
+            number += 1;
+            (number - 1, *to)
+        };
+        let neighbours: Vec<Vec<(usize, usize)>> =
+            neighbours.iter().map(|list| list.iter().map(&mut numbered).collect()).collect();
+        let mut rng = platform.scheme().random(seed, "walks");
+        let values = [
+            RandomValues::draw(platform.scheme(), &mut rng),
+            RandomValues::draw(platform.scheme(), &mut rng),
+        ];
+        let [first, second] = values;
+        let (first, second) = (first.map_err(EnsembleError::from)?, second.map_err(EnsembleError::from)?);
+        let order = first.roots().order;
+        let fields = [first, second].map(|v| TourRows::new(platform, &v, &first_visit, &turn_at));
+        let most = fields[0].of_psi.len();
+        Ok(Self { fields, neighbours, required, most, order })
+    }
+
+    /// Decision that no sequence of `length` positions is sufficient, for the bound on errors.
+    fn claim(&self, length: usize) -> Claim {
+        Claim {
+            unknowns: 3 + self.fields[0].coefficients,
+            decisions: self.required.len(),
+            order: self.order,
+            row_degree: 4,
+            // as for a verdict, with turns given as multiples of half a turn
+            row_bits: 60.0 + (length as f64).log2(),
+        }
+    }
+
+    /// First sufficient slew sequence of these lengths, and true if no shorter one was left out. Lengths that
+    /// are excluded, and an interruption, are noted in `out`.
+    fn exhausted(
+        &self,
+        lengths: Range<usize>,
+        out: &mut Walks,
+        going: &(dyn Fn() -> bool + Sync),
+    ) -> (Option<Vec<usize>>, bool) {
+        for length in lengths {
+            let count = self.walks(length);
+            if count > MOST_WALKS {
+                return (None, false);
+            }
+            let seen = AtomicU64::new(0);
+            let stopped = AtomicBool::new(false);
+            let going = || {
+                let go = !stopped.load(Ordering::Relaxed) && going();
+                stopped.fetch_or(!go, Ordering::Relaxed);
+                go
+            };
+            let found = parallel::find_first(self.neighbours.len(), |c| {
+                self.search(&self.fields[0].start(c), length, &seen, &going)
+            });
+            if found.is_some() {
+                return (found, true);
+            }
+            if stopped.load(Ordering::Relaxed) {
+                out.interrupted = true;
+                return (None, false);
+            }
+            out.none_of.push([length as u64, count]);
+            out.error_bound += count as f64 * error_bound(&self.claim(length), 2);
+        }
+        (None, true)
+    }
+
     fn does(&self, basis: &Echelon) -> bool {
         self.required.iter().all(|c| basis.has_unit(3 + c))
     }
@@ -311,60 +399,16 @@ pub fn walks(
     options: &WalkOptions,
     going: &(dyn Fn() -> bool + Sync),
 ) -> Result<Walks, DesignError> {
-    let names = options.candidates.names.clone();
     let attitudes = &options.candidates.attitudes;
     let (neighbours, tour) = tour(attitudes, options.most_turn_deg);
     let turns: usize = neighbours.iter().map(Vec::len).sum();
     if turns == 0 || turns > MOST_TURNS {
         return Err(DesignError::Turns { found: turns, most: MOST_TURNS });
     }
-    let positions = Scheme::of_angles(tour.iter().map(|&c| attitudes[c].clone())).positions;
-    let scheme = Scheme {
-        positions,
-        path: Some(Path::OneAxis),
-        combinations: Vec::new(),
-        gimbals: Gimbals::default(),
-        ..base.clone()
-    };
-    let platform = Platform::new(scheme)?;
-    let d = platform.coefficients();
+    let platform = along_tour(base, attitudes, &tour)?;
     let all = &platform.names()[3..];
-    let asked =
-        |name: &String| options.required.is_empty() || options.required.iter().any(|r| concerns(r, name));
-    if let Some(found) = options.required.iter().find(|r| !all.iter().any(|name| concerns(r, name))) {
-        return Err(DesignError::UnknownName { found: found.clone(), known: all.join(", ") });
-    }
-    let required: Vec<usize> = (0..d).filter(|&c| asked(&all[c])).collect();
-    let visit = |c: usize| tour.iter().position(|x| *x == c).unwrap_or(0);
-    let first_visit: Vec<usize> = (0..attitudes.len()).map(visit).collect();
-    let place = |from: usize, to: usize| tour.windows(2).position(|w| w == [from, to]).map(|i| i + 1);
-    let pairs = neighbours.iter().enumerate().flat_map(|(from, list)| list.iter().map(move |to| (from, *to)));
-    let turn_at: Vec<usize> = pairs.filter_map(|(from, to)| place(from, to)).collect();
-    let mut number = 0;
-    let mut numbered = |to: &usize| {
-        number += 1;
-        (number - 1, *to)
-    };
-    let neighbours: Vec<Vec<(usize, usize)>> =
-        neighbours.iter().map(|list| list.iter().map(&mut numbered).collect()).collect();
-    let mut rng = platform.scheme().random(options.seed, "walks");
-    let values =
-        [RandomValues::draw(platform.scheme(), &mut rng), RandomValues::draw(platform.scheme(), &mut rng)];
-    let [first, second] = values;
-    let (first, second) = (first.map_err(EnsembleError::from)?, second.map_err(EnsembleError::from)?);
-    let order = first.roots().order;
-    let fields = [first, second].map(|v| TourRows::new(&platform, &v, &first_visit, &turn_at));
-    let most = fields[0].of_psi.len();
-    let space = SequenceSearch { fields, neighbours, required, most };
-    let counting_bound = space.required.len().div_ceil(most).max(1);
-    let claim = |length: usize| Claim {
-        unknowns: 3 + d,
-        decisions: space.required.len(),
-        order,
-        row_degree: 4,
-        // as for a verdict, with turns given as multiples of half a turn
-        row_bits: 60.0 + (length as f64).log2(),
-    };
+    let required = required(all, &options.required)?;
+    let space = SequenceSearch::new(&platform, &tour, &neighbours, required, options.seed)?;
     let whole = space.along(&tour);
     let lost = space.required.iter().filter(|c| !whole.basis.has_unit(3 + **c));
     let never: Vec<String> = lost.map(|&c| all[c].clone()).collect();
@@ -374,64 +418,57 @@ pub fn walks(
         schema: WALKS_SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         terms: base.unknowns.to_string(),
-        candidates: names.clone(),
+        candidates: options.candidates.names.clone(),
         most_turn_deg: options.most_turn_deg,
         turns,
         required: space.required.iter().map(|&c| all[c].clone()).collect(),
         positions: None,
         walk: Vec::new(),
         angles: Vec::new(),
-        rank: [0, 3 + d],
+        rank: [0, 3 + space.fields[0].coefficients],
         latitude_deg: base.latitude.map(|l| l.degrees()),
         never,
-        counting_bound,
-        rows_per_position: most,
+        counting_bound: space.required.len().div_ceil(space.most).max(1),
+        rows_per_position: space.most,
         none_of: Vec::new(),
         proven: false,
         interrupted: false,
         error_bound: 0.0,
         seed: options.seed,
     };
-    let mut best = shortest.map(|w| w.places);
-    let mut complete = true;
-    let lengths = if out.never.is_empty() { counting_bound..longest } else { 0..0 };
-    for length in lengths {
-        let count = space.walks(length);
-        if count > MOST_WALKS {
-            complete = false;
-            break;
-        }
-        let seen = AtomicU64::new(0);
-        let stopped = AtomicBool::new(false);
-        let going = || {
-            let go = !stopped.load(Ordering::Relaxed) && going();
-            stopped.fetch_or(!go, Ordering::Relaxed);
-            go
-        };
-        let found = parallel::find_first(space.neighbours.len(), |c| {
-            space.search(&space.fields[0].start(c), length, &seen, &going)
-        });
-        if let Some(found) = found {
-            best = Some(found);
-            break;
-        }
-        if stopped.load(Ordering::Relaxed) {
-            out.interrupted = true;
-            complete = false;
-            break;
-        }
-        out.none_of.push([length as u64, count]);
-        out.error_bound += count as f64 * error_bound(&claim(length), 2);
-    }
-    if let Some(places) = &best {
+    let lengths = if out.never.is_empty() { out.counting_bound..longest } else { 0..0 };
+    let (shorter, complete) = space.exhausted(lengths, &mut out, going);
+    if let Some(places) = shorter.or(shortest.map(|w| w.places)) {
         out.positions = Some(places.len());
-        out.rank[0] = space.along(places).basis.rank();
+        out.rank[0] = space.along(&places).basis.rank();
         let angles = |&c: &usize| obsdeg_core::model::angles_text(&attitudes[c]);
         out.angles = places.iter().map(angles).collect();
-        out.walk = places.iter().map(|&c| names[c].clone()).collect();
+        out.walk = places.iter().map(|&c| options.candidates.names[c].clone()).collect();
     }
-    out.proven = complete && best.is_some() && out.error_bound < PROOF;
+    out.proven = complete && out.positions.is_some() && out.error_bound < PROOF;
     Ok(out)
+}
+
+/// Platform at the candidates of a tour, one after the other.
+fn along_tour(base: &Scheme, attitudes: &[Euler], tour: &[usize]) -> Result<Platform, DesignError> {
+    let positions = Scheme::of_angles(tour.iter().map(|&c| attitudes[c].clone())).positions;
+    let scheme = Scheme {
+        positions,
+        path: Some(Path::OneAxis),
+        combinations: Vec::new(),
+        gimbals: Gimbals::default(),
+        ..base.clone()
+    };
+    Ok(Platform::new(scheme)?)
+}
+
+/// Indices of the coefficients that must be observable: those asked for, by default all.
+fn required(all: &[String], asked_for: &[String]) -> Result<Vec<usize>, DesignError> {
+    let asked = |name: &String| asked_for.is_empty() || asked_for.iter().any(|r| concerns(r, name));
+    if let Some(found) = asked_for.iter().find(|r| !all.iter().any(|name| concerns(r, name))) {
+        return Err(DesignError::UnknownName { found: found.clone(), known: all.join(", ") });
+    }
+    Ok((0..all.len()).filter(|&c| asked(&all[c])).collect())
 }
 
 /// Slew sequence as a scheme under the assumptions of `base`; `None` where none was found.

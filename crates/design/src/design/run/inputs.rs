@@ -1,6 +1,7 @@
 //! Inputs of a search in parts: their digest, and the options and file that a user writes to state them.
 
 use std::collections::BTreeMap;
+use std::fmt::Debug;
 
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::angles_text;
@@ -99,6 +100,17 @@ fn lines(file: &str) -> Vec<(String, String)> {
 
 /// Text of all inputs that a search of parts depends on, exactly; an unlisted input does not compile.
 fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> String {
+    let version: [(&str, &dyn Debug); 1] = [("version", &env!("CARGO_PKG_VERSION"))];
+    [text(&version), of_scheme(base), of_options(options), of_conditions(conditions)].concat()
+}
+
+/// Names and values, a line each.
+fn text(of: &[(&str, &dyn Debug)]) -> String {
+    of.iter().map(|(name, value)| format!("{name}\n{value:?}\n")).collect()
+}
+
+/// Inputs by the scheme.
+fn of_scheme(base: &Scheme) -> String {
     let Scheme {
         // a design uses only the assumptions of a scheme
         name: _,
@@ -120,6 +132,23 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         gimbals,
         path,
     } = base;
+    let of: [(&str, &dyn Debug); 10] = [
+        ("carry", carry),
+        ("latitude", latitude),
+        ("geometry", geometry),
+        ("terms", unknowns),
+        ("measured azimuth", measured_azimuth),
+        ("settings of the scheme", simulation),
+        ("requirements of the scheme", requirements),
+        ("bench of the scheme", bench_of_scheme),
+        ("gimbals", gimbals),
+        ("path", path),
+    ];
+    text(&of)
+}
+
+/// Inputs by the options.
+fn of_options(options: &DesignOptions) -> String {
     let DesignOptions {
         // a part searches all sequences
         within: _,
@@ -141,6 +170,30 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         free,
         seed,
     } = options;
+    let of: [(&str, &dyn Debug); 17] = [
+        ("candidates", &candidates.names),
+        ("angles of candidates", &candidates.attitudes),
+        ("positions", positions),
+        ("observable", required),
+        ("max-degree", degree_caps),
+        ("immune", immune),
+        ("meet", meet),
+        ("max-time", total_s),
+        ("max-slew", slew_s),
+        ("criterion", criterion),
+        ("keep", keep),
+        ("restarts", restarts),
+        ("refine", refine),
+        ("divide", divide),
+        ("front", front),
+        ("free", free),
+        ("seed", seed),
+    ];
+    text(&of)
+}
+
+/// Inputs by the conditions.
+fn of_conditions(conditions: &Conditions) -> String {
     let Conditions {
         truth,
         filter,
@@ -165,35 +218,7 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         bench,
         stated,
     } = conditions;
-    let of: [(&str, &dyn std::fmt::Debug); 49] = [
-        ("version", &env!("CARGO_PKG_VERSION")),
-        ("carry", carry),
-        ("latitude", latitude),
-        ("geometry", geometry),
-        ("terms", unknowns),
-        ("measured azimuth", measured_azimuth),
-        ("settings of the scheme", simulation),
-        ("requirements of the scheme", requirements),
-        ("bench of the scheme", bench_of_scheme),
-        ("gimbals", gimbals),
-        ("path", path),
-        ("candidates", &candidates.names),
-        ("angles of candidates", &candidates.attitudes),
-        ("positions", positions),
-        ("observable", required),
-        ("max-degree", degree_caps),
-        ("immune", immune),
-        ("meet", meet),
-        ("max-time", total_s),
-        ("max-slew", slew_s),
-        ("criterion", criterion),
-        ("keep", keep),
-        ("restarts", restarts),
-        ("refine", refine),
-        ("divide", divide),
-        ("front", front),
-        ("free", free),
-        ("seed", seed),
+    let of: [(&str, &dyn Debug); 21] = [
         ("truth", truth),
         ("filter", filter),
         ("step", step_s),
@@ -217,8 +242,8 @@ fn everything(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -
         ("stated conditions", stated),
     ];
     // parts of searches of before know no such time
-    let settle = (*settle_s > 0.0).then_some(("settle", settle_s as &dyn std::fmt::Debug));
-    of.into_iter().chain(settle).map(|(name, value)| format!("{name}\n{value:?}\n")).collect()
+    let settle = (*settle_s > 0.0).then_some(("settle", settle_s as &dyn Debug));
+    text(&of) + &text(settle.as_slice())
 }
 
 /// Text `simulation.dwell_s is 999.0, here 1000.0`: inputs that differ; long values are left out.

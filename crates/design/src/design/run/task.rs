@@ -236,12 +236,29 @@ impl Demands<'_> {
     }
 }
 
-/// Candidates orbit by orbit: a set that begins with a representative stands for all its images. `kept` are
-/// the candidates of the symmetry.
-fn by_orbits(symmetry: &Symmetry, kept: Vec<usize>) -> Vec<usize> {
+/// Candidates, each attitude once, orbit by orbit, so that a set that begins with a representative stands for
+/// all its images; with their rows and their symmetry.
+fn by_orbits(candidates: &Candidates, rows: &Rows, demands: &Demands<'_>) -> (Candidates, Rows, Symmetry) {
+    let repeated = rows.repeated();
+    let kept: Vec<usize> = (0..candidates.attitudes.len()).filter(|i| !repeated.contains(i)).collect();
+    let same = |i: usize, j: usize| demands.are_alike(i, j);
+    let symmetry = rows.select(&kept).symmetry(&same);
     let mut order: Vec<(usize, usize)> = symmetry.orbit.iter().copied().zip(kept).collect();
     order.sort_unstable();
-    order.into_iter().map(|(_, c)| c).collect()
+    let order: Vec<usize> = order.into_iter().map(|(_, c)| c).collect();
+    let (candidates, rows) = (candidates.permuted(&order), rows.select(&order));
+    let symmetry = rows.symmetry(&same);
+    (candidates, rows, symmetry)
+}
+
+/// Constraints of the schemes of a task.
+fn constraints(options: &DesignOptions, limits: Limits, caps: Vec<usize>) -> Constraints {
+    Constraints {
+        total_s: options.total_s,
+        slew_s: options.slew_s,
+        sigmas: options.meet.then_some(limits),
+        degrees: caps.iter().any(|c| *c != usize::MAX).then_some(caps),
+    }
 }
 
 impl<'a> Task<'a> {
@@ -276,9 +293,6 @@ impl<'a> Task<'a> {
         // for slew sequences the rows only tell which attitudes are the same
         let by_sets = Scheme { carry: if walks { Carry::Platform } else { base.carry }, ..base.clone() };
         let rows = Rows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
-        // an attitude counts once
-        let repeated = rows.repeated();
-        let kept: Vec<usize> = (0..candidates.attitudes.len()).filter(|i| !repeated.contains(i)).collect();
         // a turn of the platform axes renames psi as well
         let renames = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
             && priors[..3].iter().all(|p| *p == priors[0])
@@ -290,16 +304,7 @@ impl<'a> Task<'a> {
             priors: &priors[first..],
             renames,
         };
-        let same = |i: usize, j: usize| demands.are_alike(i, j);
-        let order = by_orbits(&rows.select(&kept).symmetry(&same), kept);
-        let (candidates, rows) = (candidates.permuted(&order), rows.select(&order));
-        let symmetry = rows.symmetry(&same);
-        let constraints = Constraints {
-            total_s: options.total_s,
-            slew_s: options.slew_s,
-            sigmas: options.meet.then_some(limits),
-            degrees: caps.iter().any(|c| *c != usize::MAX).then_some(caps),
-        };
+        let (candidates, rows, symmetry) = by_orbits(&candidates, &rows, &demands);
         Ok(Self {
             base,
             conditions,
@@ -307,7 +312,7 @@ impl<'a> Task<'a> {
             candidates,
             required,
             criterion,
-            constraints,
+            constraints: constraints(options, limits, caps),
             rows,
             symmetry,
             omitted,

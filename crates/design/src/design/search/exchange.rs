@@ -41,77 +41,141 @@ impl Search<'_> {
         seed: u64,
         firsts: Option<&[usize]>,
     ) -> Best {
-        let candidates = self.rows.candidates();
         let total = given.len() + restarts as usize;
         let meter = Meter::new(self.progress, total);
         let from = |start: u64| {
             let mut rng = SplitMix64::new(seed ^ start.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-            let mut draw = |n: usize| rng.below(n as u64) as usize;
-            let random = || {
-                let place = |place: usize| match firsts {
-                    Some(firsts) if place == 0 => firsts[draw(firsts.len())],
-                    _ => draw(candidates),
-                };
-                (0..k).map(place).map(Stop::from).collect()
-            };
-            let mut now: Vec<Stop> = given.get(start as usize).cloned().unwrap_or_else(random);
-            let mut best = Best::default();
-            let mut held = Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() };
-            let mut trial = Trial::new(self.evaluator);
-            // keeps a better sequence; false when the search is stopped
-            let mut try_out = |before: (&SequenceState, usize), now: &[Stop], held: &mut Scored| {
-                best.examined += 1;
-                let other = self.worth_behind(before, now, &mut trial);
-                if firsts.is_some() && best.wants(self.keep, &other.worth, other.seconds) {
-                    let mut other = self.judged(other.clone());
-                    self.evaluator.tidy(&mut other.sequence);
-                    best.add(self.keep, other);
-                }
-                if other.worth.better_than(&held.worth) {
-                    let other = self.judged(other);
-                    if other.worth.better_than(&held.worth) {
-                        *held = other;
-                    }
-                }
-                !best.examined.is_multiple_of(PATIENCE)
-                    || meter.report(0, PATIENCE, Some(&*held).filter(|h| h.worth.is_valid()))
-            };
-            'rounds: for _ in 0..ROUNDS {
-                let round = held.worth;
-                for place in 0..k {
-                    // a choice may change the turn to the next position, but never the one to this
-                    // position
-                    let before = self.evaluator.state_of(&now[..place]);
-                    let first = |stop: Stop| place > 0 || firsts.is_none_or(|f| f.contains(&stop.candidate));
-                    for (stop, next) in self.choices(&now, place).into_iter().filter(|c| first(c.0)) {
-                        now[place] = stop;
-                        next.into_iter().for_each(|next| now[place + 1] = next);
-                        if !try_out((&before, place), &now, &mut held) {
-                            break 'rounds;
-                        }
-                    }
-                    now.copy_from_slice(&held.sequence);
-                }
-                for (a, b) in (0..k).flat_map(|a| (0..a).map(move |b| (a, b))) {
-                    let first = b > 0 || firsts.is_none_or(|f| f.contains(&now[a].candidate));
-                    if first && self.evaluator.ordered() && now[a].candidate != now[b].candidate {
-                        let before = self.evaluator.state_of(&now[..b]);
-                        now.swap(a, b);
-                        if !try_out((&before, b), &now, &mut held) {
-                            break 'rounds;
-                        }
-                        now.copy_from_slice(&held.sequence);
-                    }
-                }
-                if !held.worth.better_than(&round) {
-                    break;
-                }
-            }
-            self.evaluator.tidy(&mut held.sequence);
-            best.add(self.keep, held);
-            best
+            let random = || self.drawn(k, firsts, &mut rng);
+            let now: Vec<Stop> = given.get(start as usize).cloned().unwrap_or_else(random);
+            let mut exchange = Exchange::new(self, &meter, firsts, now);
+            exchange.improve(k);
+            exchange.finished()
         };
         let parts = parallel::map(total, |start| meter.part(|| from(start as u64)));
         meter.gather(self.keep, parts)
+    }
+
+    /// Random sequence of `k` candidates, the first of them one of `firsts`.
+    fn drawn(&self, k: usize, firsts: Option<&[usize]>, rng: &mut SplitMix64) -> Vec<Stop> {
+        let mut draw = |n: usize| rng.below(n as u64) as usize;
+        let place = |place: usize| match firsts {
+            Some(firsts) if place == 0 => firsts[draw(firsts.len())],
+            _ => draw(self.rows.candidates()),
+        };
+        (0..k).map(place).map(Stop::from).collect()
+    }
+}
+
+/// Exchange from one start.
+struct Exchange<'a> {
+    search: &'a Search<'a>,
+    meter: &'a Meter<'a>,
+    /// Candidates that may stand first; `None` for all.
+    firsts: Option<&'a [usize]>,
+    /// Sequence that is tried.
+    now: Vec<Stop>,
+    /// Best sequence of this exchange.
+    held: Scored,
+    /// Kept sequences, and the number of sequences examined.
+    best: Best,
+    trial: Trial,
+}
+
+impl<'a> Exchange<'a> {
+    fn new(
+        search: &'a Search<'a>,
+        meter: &'a Meter<'a>,
+        firsts: Option<&'a [usize]>,
+        now: Vec<Stop>,
+    ) -> Self {
+        Self {
+            search,
+            meter,
+            firsts,
+            held: Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() },
+            now,
+            best: Best::default(),
+            trial: Trial::new(search.evaluator),
+        }
+    }
+
+    /// Exchanges and swaps the `k` places until neither helps.
+    fn improve(&mut self, k: usize) {
+        for _ in 0..ROUNDS {
+            let round = self.held.worth;
+            if !self.replace(k) || !self.swap(k) || !self.held.worth.better_than(&round) {
+                break;
+            }
+        }
+    }
+
+    /// True if a candidate may stand at a place.
+    fn may_stand(&self, candidate: usize, place: usize) -> bool {
+        place > 0 || self.firsts.is_none_or(|f| f.contains(&candidate))
+    }
+
+    /// Puts the best choice at each place; false when the search is stopped.
+    fn replace(&mut self, k: usize) -> bool {
+        for place in 0..k {
+            // a choice may change the turn to the next position, but never the one to this position
+            let before = self.search.evaluator.state_of(&self.now[..place]);
+            for (stop, next) in self.search.choices(&self.now, place) {
+                if !self.may_stand(stop.candidate, place) {
+                    continue;
+                }
+                self.now[place] = stop;
+                next.into_iter().for_each(|next| self.now[place + 1] = next);
+                if !self.try_out((&before, place)) {
+                    return false;
+                }
+            }
+            self.now.copy_from_slice(&self.held.sequence);
+        }
+        true
+    }
+
+    /// Swaps pairs of places where that is better; false when the search is stopped.
+    fn swap(&mut self, k: usize) -> bool {
+        for (a, b) in (0..k).flat_map(|a| (0..a).map(move |b| (a, b))) {
+            let differ = self.now[a].candidate != self.now[b].candidate;
+            if self.may_stand(self.now[a].candidate, b) && self.search.evaluator.ordered() && differ {
+                let before = self.search.evaluator.state_of(&self.now[..b]);
+                self.now.swap(a, b);
+                if !self.try_out((&before, b)) {
+                    return false;
+                }
+                self.now.copy_from_slice(&self.held.sequence);
+            }
+        }
+        true
+    }
+
+    /// Keeps the present sequence if it is better; false when the search is stopped. `before` is the state
+    /// behind its first positions, with their number.
+    fn try_out(&mut self, before: (&SequenceState, usize)) -> bool {
+        let (search, keep) = (self.search, self.search.keep);
+        self.best.examined += 1;
+        let other = search.worth_behind(before, &self.now, &mut self.trial);
+        if self.firsts.is_some() && self.best.wants(keep, &other.worth, other.seconds) {
+            let mut other = search.judged(other.clone());
+            search.evaluator.tidy(&mut other.sequence);
+            self.best.add(keep, other);
+        }
+        if other.worth.better_than(&self.held.worth) {
+            let other = search.judged(other);
+            if other.worth.better_than(&self.held.worth) {
+                self.held = other;
+            }
+        }
+        !self.best.examined.is_multiple_of(PATIENCE)
+            || self.meter.report(0, PATIENCE, Some(&self.held).filter(|h| h.worth.is_valid()))
+    }
+
+    /// Kept sequences with the best one of this exchange.
+    fn finished(self) -> Best {
+        let Self { search, mut held, mut best, .. } = self;
+        search.evaluator.tidy(&mut held.sequence);
+        best.add(search.keep, held);
+        best
     }
 }
