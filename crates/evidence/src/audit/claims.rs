@@ -23,12 +23,13 @@ pub(super) fn positions(attitudes: &[&str]) -> Scheme {
     Scheme::of_angles(attitudes.iter().filter_map(|a| parse_attitude(a).ok()))
 }
 
-pub(super) struct Judged {
+/// Scheme with the degrees of its unknowns.
+pub(super) struct JudgedScheme {
     names: Vec<String>,
     degrees: Degrees,
 }
 
-impl Judged {
+impl JudgedScheme {
     pub(super) fn of(scheme: Scheme, seed: u64) -> Result<Self, AnalysisError> {
         let platform = Platform::new(scheme)?;
         Ok(Self { names: platform.names().to_vec(), degrees: judge(&platform, seed)?.degrees })
@@ -190,11 +191,23 @@ const ATTITUDES: usize = 16;
 /// Attitudes of section 3.2.
 pub(super) const PAPER: [&str; 2] = ["0,0,0", "180,0,0"];
 
-/// Claims of section 2.2, and those of section 3.3 that need no filter.
+/// Claims of section 2.2.
+///
+/// # Errors
+/// [`AuditError`].
 pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
-    let mut out = Vec::new();
+    let mut out = Vec::from(separation_lines(seed)?);
+    let p1p2 = JudgedScheme::of(positions(&PAPER), seed)?;
+    out.push(first_derivative_line(&p1p2, seed)?);
+    out.push(two_positions_line(seed)?);
+    out.push(zero_order_line(&p1p2, seed)?);
+    Ok(out)
+}
+
+/// Claims on the excitation of coefficients, and on those that eps^n at several attitudes separates.
+fn separation_lines(seed: u64) -> Result<[Line; 3], AnalysisError> {
     let unit = everywhere(ANY, seed, |at| Ok(at.value("gx^2 + gy^2 + gz^2")? == at.field.one()))?;
-    out.push(line(
+    let excited = line(
         "section 2.2",
         "a first-order coefficient is excited most where its component of g^c is 1 and the others are 0",
         finding(unit),
@@ -202,10 +215,10 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             "the squares of the components of g^c {} to 1 at every attitude",
             if unit { "add up" } else { "do not add up" }
         ),
-    ));
+    );
     let x = DeterminedCoefficients::of(0, ATTITUDES, seed)?;
     let (others, inputs) = (x.all(|n| !input_axis(n)), x.any(input_axis));
-    out.push(line(
+    let of_x = line(
         "section 2.2",
         "eps_x^n at several attitudes tells D_F, D_O, D_S apart, of the D_I only differences",
         finding(others && !inputs && x.differences),
@@ -216,18 +229,21 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             yes(x.differences),
             yes(inputs)
         ),
-    ));
+    );
     let y = DeterminedCoefficients::of(1, ATTITUDES, seed)?.all(input_axis);
-    out.push(line(
+    let of_y = line(
         "section 2.2",
         "eps_y^n at several attitudes tells D_IX, D_IY, D_IZ",
         finding(y),
         format!("at {ATTITUDES} generic attitudes the mended (23) tells each of them: {}", yes(y)),
-    ));
+    );
+    Ok([excited, of_x, of_y])
+}
 
-    // coefficients that need Z''
+/// Claim on the coefficients that need Z''.
+fn first_derivative_line(p1p2: &JudgedScheme, seed: u64) -> Result<Line, AnalysisError> {
     let one_order = |n: usize, carry: Carry| -> Result<bool, AnalysisError> {
-        let judged = Judged::of(generic(n, carry), seed)?;
+        let judged = JudgedScheme::of(generic(n, carry), seed)?;
         Ok(judged.of_coefficients(|name| !input_axis(name)).iter().all(|d| *d == Some(1)))
     };
     // None: not with fewer than `ATTITUDES` positions
@@ -241,7 +257,6 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
     };
     let [platform, inertial, reset] = Carry::ALL.map(fewest);
     let from = [platform?, inertial?, reset?];
-    let p1p2 = Judged::of(positions(&PAPER), seed)?;
     let at_paper = p1p2.of_coefficients(|n| !input_axis(n)).into_iter().flatten().all(|d| d <= 1);
     let found = match (at_paper, from.iter().all(Option::is_some)) {
         (true, true) => Finding::Agree,
@@ -251,7 +266,7 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
     let fewest = Carry::ALL.into_iter().zip(from).map(|(carry, n)| {
         n.map_or(format!("not up to {} under {carry}", ATTITUDES - 1), |n| format!("{n} under {carry}"))
     });
-    out.push(line(
+    Ok(line(
         "section 2.2",
         "all coefficients but the D_I need only Z and Z'",
         found,
@@ -260,9 +275,11 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             show(p1p2.degree("D_FY")),
             fewest.collect::<Vec<_>>().join(", ")
         ),
-    ));
+    ))
+}
 
-    // number of positions that psi needs
+/// Claim on the number of positions that psi needs.
+fn two_positions_line(seed: u64) -> Result<Line, AnalysisError> {
     let hidden = Carry::ALL.map(|carry| azimuth_is_hidden(carry, seed));
     let mut needs_two = true;
     for hidden in hidden {
@@ -273,13 +290,13 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
     let together = everywhere(ANY, seed, |at| Ok(at.value(&squares)? == at.field.one()))?;
     let (mut suffice, mut fail) = (Vec::new(), Vec::new());
     for carry in Carry::ALL {
-        let judged = Judged::of(generic(2, carry), seed)?;
+        let judged = JudgedScheme::of(generic(2, carry), seed)?;
         let mut psi = judged.names.iter().zip(&judged.degrees.degree).filter(|(n, _)| n.starts_with("psi"));
         let list = if psi.all(|(_, d)| d.is_some()) { &mut suffice } else { &mut fail };
         list.push(carry.to_string());
     }
     let or_none = |list: Vec<String>| if list.is_empty() { "no".into() } else { list.join(", ") };
-    out.push(line(
+    Ok(line(
         "section 2.2",
         "at least two different positions are needed for psi",
         finding(needs_two && together),
@@ -294,19 +311,22 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             or_none(suffice),
             or_none(fail)
         ),
-    ));
+    ))
+}
 
+/// Claim on the degree of eps_z - wN psi_y(0).
+fn zero_order_line(p1p2: &JudgedScheme, seed: u64) -> Result<Line, AnalysisError> {
     let local = single_position(seed)?;
-    let six = [Carry::Platform, Carry::Inertial].map(|carry| Judged::of(generic(6, carry), seed));
-    let of_biases = |j: &Judged| ["D_FX", "D_FY", "D_FZ"].map(|n| j.degree(n));
-    let same = |j: &Judged| of_biases(j).iter().all(|d| *d == local.combination);
+    let six = [Carry::Platform, Carry::Inertial].map(|carry| JudgedScheme::of(generic(6, carry), seed));
+    let of_biases = |j: &JudgedScheme| ["D_FX", "D_FY", "D_FZ"].map(|n| j.degree(n));
+    let same = |j: &JudgedScheme| of_biases(j).iter().all(|d| *d == local.combination);
     let [platform, inertial] = six;
     let enough = same(&platform?) && same(&inertial?);
-    let list = of_biases(&p1p2).map(show).join(", ");
-    out.push(line(
+    let list = of_biases(p1p2).map(show).join(", ");
+    Ok(line(
         "section 2.2",
         "eps_z - wN psi_y(0) has the degree of the zero-order coefficients, a better one than the D_I",
-        match (same(&p1p2), enough) {
+        match (same(p1p2), enough) {
             (true, true) => Finding::Agree,
             (false, true) => Finding::Conditional,
             _ => Finding::Disagree,
@@ -317,8 +337,7 @@ pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
             show(local.combination),
             if enough { "all three have its degree" } else { "not all have its degree" }
         ),
-    ));
-    Ok(out)
+    ))
 }
 
 fn yes(b: bool) -> &'static str {
@@ -360,7 +379,7 @@ fn single_position(seed: u64) -> Result<LocalDegrees, AnalysisError> {
 
 /// Claims of section 3.3 about segment 1 that need no filter.
 pub(super) fn segment_1(seed: u64) -> Result<[Line; 2], AnalysisError> {
-    let p1 = Judged::of(positions(&PAPER[..1]), seed)?;
+    let p1 = JudgedScheme::of(positions(&PAPER[..1]), seed)?;
     let psi_y = p1.degree("psi_y");
     let named = ["D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ"];
     let inseparable = named.iter().all(|n| p1.status(n) == Some(Status::Inseparable));
@@ -392,15 +411,15 @@ pub(super) fn segment_1(seed: u64) -> Result<[Line; 2], AnalysisError> {
     ])
 }
 
-/// Both conclusions of the paper.
-pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
+/// Conclusion 1: the classes of the unknowns by degree.
+fn classes_line(seed: u64) -> Result<Line, AnalysisError> {
     let local = single_position(seed)?;
     let ([best_x, best_z], [eps_x, eps_y]) = (local.psi, local.eps);
     let classes = local.psi == [Some(0); 2]
         && [eps_x, local.combination] == [Some(1); 2]
         && eps_y == Some(2)
         && local.rate == Some(1);
-    let first = line(
+    Ok(line(
         "conclusion 1",
         "psi_x, psi_z best; eps_x, psi_y', wN psi_y(0) - eps_z in the middle; eps_y worst",
         finding(classes),
@@ -416,18 +435,24 @@ pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
             show(local.rate),
             local.lost.join(", ")
         ),
-    );
+    ))
+}
 
-    let lemma = common_mode(seed)?;
-    // second path: concrete schemes
+/// True if the D_I have degree 2 wherever they are observable, at concrete schemes: a second path.
+fn degrees_are_two(seed: u64) -> Result<bool, AnalysisError> {
     let mut tried = true;
     let cardinals = || Scheme::of_angles(cardinal_names().iter().filter_map(|n| cardinal(n)));
     for carry in Carry::ALL {
         for scheme in [generic(12, carry), Scheme { carry, ..cardinals() }] {
-            let judged = Judged::of(scheme, seed)?;
+            let judged = JudgedScheme::of(scheme, seed)?;
             tried &= judged.of_coefficients(input_axis).iter().all(|d| d.is_none_or(|k| k == 2));
         }
     }
+    Ok(tried)
+}
+
+/// Accuracy orders of the D_I at generic positions, in words.
+fn orders_of_inputs(seed: u64) -> Result<Vec<String>, AuditError> {
     let mut orders = Vec::new();
     for carry in [Carry::Platform, Carry::Inertial] {
         for n in [5, 6] {
@@ -439,6 +464,18 @@ pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
             orders.push(format!("{} at {n} under {carry}", of_d_i.map(one).join(" ")));
         }
     }
+    Ok(orders)
+}
+
+/// Both conclusions of the paper.
+///
+/// # Errors
+/// [`AuditError`].
+pub(super) fn conclusions(seed: u64) -> Result<[Line; 2], AuditError> {
+    let first = classes_line(seed)?;
+    let lemma = common_mode(seed)?;
+    let tried = degrees_are_two(seed)?;
+    let orders = orders_of_inputs(seed)?;
     let second = line(
         "conclusion 2",
         "the D_I always have a poor degree, whatever the scheme",

@@ -212,74 +212,72 @@ pub(super) fn plain(ok: bool) -> String {
     }
 }
 
-pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
-    let mut out = Vec::new();
-    let mut add = |place: &str, claim: &str, holds: bool, reason: String| {
-        out.push(line(place, claim, finding(holds), reason));
-    };
-    let holds = |attitude: &str, pairs: &[(&str, &str)]| identity(attitude, pairs, seed);
+/// Line of an equation that is tested without conditions by `pairs` of equal members.
+fn plain_line(place: &str, claim: &str, pairs: &[(&str, &str)], seed: u64) -> Result<Line, AnalysisError> {
+    let ok = identity(ANY, pairs, seed)?;
+    Ok(line(place, claim, finding(ok), plain(ok)))
+}
 
+/// Lines of the equations as printed: the output with its derivatives, (6), (9), (10), (12), the solution,
+/// (13)-(18), and g^c, (20).
+fn output_lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
     let cross = [
         ("Zcx", "-(gy*psi_z - gz*psi_y)"),
         ("Zcy", "-(gz*psi_x - gx*psi_z)"),
         ("Zcz", "-(gx*psi_y - gy*psi_x)"),
     ];
-    let ok = holds(ANY, &cross)?;
-    add("(6)", "Z = -[g^c x] psi", ok, plain(ok));
-    let ok = holds(ANY, &[("Z1", "pz"), ("Z3", "-px")])?;
-    add("(9)", "Z^n = (psi_z, 0, -psi_x)", ok, plain(ok));
-    let ok = holds(ANY, &[("Z1p", "wU*px - wN*py + ez"), ("Z3p", "wU*pz - ex")])?;
-    add("(10)", "Z'^n = (wU psi_x - wN psi_y + eps_z, 0, wU psi_z - eps_x)", ok, plain(ok));
-    let ok =
-        holds(ANY, &[("Z1pp", "-(wN^2 + wU^2)*pz + wU*ex - wN*ey"), ("Z3pp", "wU^2*px - wU*wN*py + wU*ez")])?;
-    add(
-        "(12)",
-        "Z''^n = (-(wN^2 + wU^2) psi_z + wU eps_x - wN eps_y, 0, wU^2 psi_x - wU wN psi_y + wU eps_z)",
-        ok,
-        plain(ok),
-    );
-    for (place, claim, left, right) in [
-        ("(13)", "psi_x = -Z3", "px", "-Z3"),
-        ("(14)", "psi_z = Z1", "pz", "Z1"),
-        ("(15)", "eps_x = wU psi_z - Z3'", "ex", "wU*pz - Z3p"),
+    let second = [("Z1pp", "-(wN^2 + wU^2)*pz + wU*ex - wN*ey"), ("Z3pp", "wU^2*px - wU*wN*py + wU*ez")];
+    let all: [(&str, &str, &[(&str, &str)]); 11] = [
+        ("(6)", "Z = -[g^c x] psi", &cross),
+        ("(9)", "Z^n = (psi_z, 0, -psi_x)", &[("Z1", "pz"), ("Z3", "-px")]),
+        (
+            "(10)",
+            "Z'^n = (wU psi_x - wN psi_y + eps_z, 0, wU psi_z - eps_x)",
+            &[("Z1p", "wU*px - wN*py + ez"), ("Z3p", "wU*pz - ex")],
+        ),
+        (
+            "(12)",
+            "Z''^n = (-(wN^2 + wU^2) psi_z + wU eps_x - wN eps_y, 0, wU^2 psi_x - wU wN psi_y + wU eps_z)",
+            &second,
+        ),
+        ("(13)", "psi_x = -Z3", &[("px", "-Z3")]),
+        ("(14)", "psi_z = Z1", &[("pz", "Z1")]),
+        ("(15)", "eps_x = wU psi_z - Z3'", &[("ex", "wU*pz - Z3p")]),
         (
             "(16)",
             "eps_y = (wU eps_x - Z1'' - (wN^2 + wU^2) psi_z) / wN",
-            "ey",
-            "(wU*ex - Z1pp - (wN^2 + wU^2)*pz)/wN",
+            &[("ey", "(wU*ex - Z1pp - (wN^2 + wU^2)*pz)/wN")],
         ),
-        ("(17)", "wN psi_y - eps_z = wU psi_x - Z1'", "wN*py - ez", "wU*px - Z1p"),
-        ("(18)", "(wN psi_y - eps_z) wU = wU^2 psi_x - Z3''", "(wN*py - ez)*wU", "wU^2*px - Z3pp"),
-    ] {
-        let ok = holds(ANY, &[(left, right)])?;
-        add(place, claim, ok, plain(ok));
-    }
-    let ok = holds(ANY, &G)?;
-    add("(20)", "g^c in the Euler angles of (19)", ok, plain(ok));
+        ("(17)", "wN psi_y - eps_z = wU psi_x - Z1'", &[("wN*py - ez", "wU*px - Z1p")]),
+        ("(18)", "(wN psi_y - eps_z) wU = wU^2 psi_x - Z3''", &[("(wN*py - ez)*wU", "wU^2*px - Z3pp")]),
+        ("(20)", "g^c in the Euler angles of (19)", &G),
+    ];
+    all.into_iter().map(|(place, claim, pairs)| plain_line(place, claim, pairs, seed)).collect()
+}
 
+/// Line of (21), also with the other sign of D_SX.
+fn eps_c_line(seed: u64) -> Result<Line, AnalysisError> {
+    let holds = |x: &str| identity(ANY, &[("cx", x), ("cy", EPS_C_Y), ("cz", EPS_C_Z)], seed);
     let (printed_x, corrected_x) = (EPS_C_X.replace("%s", "+"), EPS_C_X.replace("%s", "-"));
-    let printed = holds(ANY, &[("cx", &printed_x), ("cy", EPS_C_Y), ("cz", EPS_C_Z)])?;
-    let corrected = holds(ANY, &[("cx", &corrected_x), ("cy", EPS_C_Y), ("cz", EPS_C_Z)])?;
+    let printed = holds(&printed_x)?;
+    let corrected = holds(&corrected_x)?;
     let reason = format!(
         "as printed {}; with a minus before D_SX {} (as in (22), (27), (28))",
         plain(printed),
         if corrected { "an identity" } else { "still none" }
     );
-    add("(21)", "eps^c in the Euler angles", printed, reason);
+    Ok(line("(21)", "eps^c in the Euler angles", finding(printed), reason))
+}
 
-    let ok = holds(ANY, &[("ex", EPS_N_X)])?;
-    add("(22)", "eps_x^n in the Euler angles", ok, plain(ok));
-
+/// Line of (23), also with one or both of its slips corrected.
+fn eps_n_y_line(seed: u64) -> Result<Line, AnalysisError> {
     let eps_n_y = |f: &str, c: &str| EPS_N_Y.replace("%f", f).replace("%c", c);
-    let as_printed = eps_n_y("D_FZ", "sin(beta)");
-    let only_first = eps_n_y("D_FY", "sin(beta)");
-    let only_second = eps_n_y("D_FZ", "cos(alpha)");
-    let mended = eps_n_y("D_FY", "cos(alpha)");
+    let holds = |right: String| identity(ANY, &[("ey", &right)], seed);
     let [a, b, c, d] = [
-        holds(ANY, &[("ey", &as_printed)])?,
-        holds(ANY, &[("ey", &only_first)])?,
-        holds(ANY, &[("ey", &only_second)])?,
-        holds(ANY, &[("ey", &mended)])?,
+        holds(eps_n_y("D_FZ", "sin(beta)"))?,
+        holds(eps_n_y("D_FY", "sin(beta)"))?,
+        holds(eps_n_y("D_FZ", "cos(alpha)"))?,
+        holds(eps_n_y("D_FY", "cos(alpha)"))?,
     ];
     let reason = format!(
         "as printed {}; with the first D_FZ read as D_FY and the last factor of (D_OX sin g - D_OY cos g) \
@@ -289,21 +287,16 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         if d { "an identity" } else { "still none" },
         if b || c { "an identity" } else { "none" }
     );
-    add("(23)", "eps_y^n in the Euler angles", a, reason);
+    Ok(line("(23)", "eps_y^n in the Euler angles", finding(a), reason))
+}
 
-    let ok = holds(ANY, &PSI_C)?;
-    add("(24)", "psi^c in psi^n", ok, plain(ok));
-    let ok = holds(ANY, &[("pyp", "wN*pz + ey")])?;
-    add("(25)", "psi_y' = wN psi_z + eps_y", ok, plain(ok));
-    // (26) at time t: psi_y(t) = psi_y(0) + psi_y' t (+ q t^2 when psi_y' is not constant)
+/// Line of (26) at time t: `psi_y(t) = psi_y(0) + psi_y' t` (`+ q t^2` when psi_y' is not constant).
+fn psi_y_line(seed: u64) -> Result<Line, AnalysisError> {
     let left = "ez - wN*(py - pyp*t)";
     let curved = "ez - wN*(py - pyp*t - q*t^2)";
     let right = "Z1p + pyp*t*wN - wU*px";
-    let (constant, varying) = (holds(ANY, &[(left, right)])?, holds(ANY, &[(curved, right)])?);
-    let ok = holds("0,0,0", &[("ex", "D_FX - D_SX"), ("ey", "D_FY - D_IY"), ("ez", "D_FZ - D_SZ")])?;
-    add("(27)", "eps^n at p1 = (0,0,0)", ok, plain(ok));
-    let ok = holds("180,0,0", &[("ex", "D_FX + D_SX"), ("ey", "-(D_FY + D_IY)"), ("ez", "-(D_FZ + D_SZ)")])?;
-    add("(28)", "eps^n at p2 = (180,0,0)", ok, plain(ok));
+    let (constant, varying) =
+        (identity(ANY, &[(left, right)], seed)?, identity(ANY, &[(curved, right)], seed)?);
     let (finding, reason) = match (constant, varying) {
         (true, false) => (
             Finding::Conditional,
@@ -311,6 +304,29 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         ),
         _ => (finding(constant), plain(constant)),
     };
-    out.push(line("(26)", "eps_z - wN psi_y(0) = Z1' + psi_y' t wN - wU psi_x", finding, reason));
+    Ok(line("(26)", "eps_z - wN psi_y(0) = Z1' + psi_y' t wN - wU psi_x", finding, reason))
+}
+
+/// Lines of the equations of the output, the drift and the solution.
+///
+/// # Errors
+/// [`AnalysisError`].
+pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
+    let mut out = output_lines(seed)?;
+    out.push(eps_c_line(seed)?);
+    out.push(plain_line("(22)", "eps_x^n in the Euler angles", &[("ex", EPS_N_X)], seed)?);
+    out.push(eps_n_y_line(seed)?);
+    out.push(plain_line("(24)", "psi^c in psi^n", &PSI_C, seed)?);
+    out.push(plain_line("(25)", "psi_y' = wN psi_z + eps_y", &[("pyp", "wN*pz + ey")], seed)?);
+    let psi_y = psi_y_line(seed)?;
+    let p1 = [("ex", "D_FX - D_SX"), ("ey", "D_FY - D_IY"), ("ez", "D_FZ - D_SZ")];
+    let p2 = [("ex", "D_FX + D_SX"), ("ey", "-(D_FY + D_IY)"), ("ez", "-(D_FZ + D_SZ)")];
+    for (place, claim, attitude, pairs) in
+        [("(27)", "eps^n at p1 = (0,0,0)", "0,0,0", p1), ("(28)", "eps^n at p2 = (180,0,0)", "180,0,0", p2)]
+    {
+        let ok = identity(attitude, &pairs, seed)?;
+        out.push(line(place, claim, finding(ok), plain(ok)));
+    }
+    out.push(psi_y);
     Ok(out)
 }

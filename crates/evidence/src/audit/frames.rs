@@ -220,19 +220,26 @@ fn euler_conventions(seed: u64) -> Result<Vec<usize>, AnalysisError> {
     Ok(right)
 }
 
-pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
-    let holds = |test: &dyn Fn(&RandomPoint) -> Result<bool, AnalysisError>| everywhere(ANY, seed, test);
-    let mut out = Vec::new();
+/// Rates of n against c, `omega_nc = omega_c - C_n^c omega_ie`, at the `omega_c` of (7) or at a random one.
+fn rate_of_c(at: &RandomPoint, tracks: bool) -> Result<[u64; 3], AnalysisError> {
+    let f = &at.field;
+    let earth = apply(f, &transpose(&at.attitude), &at.vector(RATES)?);
+    let commanded = if tracks { earth } else { at.vector(["rx", "ry", "rz"])? };
+    Ok(sum(f, &commanded, &negated(f, &earth)))
+}
 
-    let rotation = holds(&|at| {
+/// Audit of (1) and (2): small turns and their kinematics.
+fn turn_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
+    let rotation = everywhere(ANY, seed, |at| {
         let (f, psi) = (&at.field, at.vector(PSI)?);
         of_second_order(at, |h| {
             let c = small_turn(f, &psi, h, true);
             plus(f, &product(f, &c, &transpose(&c)), f.neg(f.one()), &identity(f))
         })
     })?;
-    let (sign, other) = (holds(&|at| kinematics(at, true))?, holds(&|at| kinematics(at, false))?);
-    out.push(line(
+    let sign = everywhere(ANY, seed, |at| kinematics(at, true))?;
+    let other = everywhere(ANY, seed, |at| kinematics(at, false))?;
+    let one = line(
         "(1)",
         "C_c^p = I - [psi x]",
         finding(rotation && sign),
@@ -242,8 +249,8 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
             if sign { "follows" } else { "does not follow" },
             if other { "does as well" } else { "does not" }
         ),
-    ));
-    out.push(line(
+    );
+    let two = line(
         "(2)",
         "psi' = [psi x] omega_c + eps",
         finding(sign),
@@ -253,27 +260,31 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
              omega_c: {}",
             plain(sign)
         ),
-    ));
-    out.extend(mounting_lines(seed)?);
+    );
+    Ok([one, two])
+}
 
-    // C_n^p (-g^n) = -C_c^p C_n^c g^n
-    let output = |at: &RandomPoint| -> Result<[u64; 3], AnalysisError> {
-        let f = &at.field;
-        let to_p = product(f, &small_turn(f, &at.vector(PSI)?, f.one(), true), &transpose(&at.attitude));
-        Ok(apply(f, &to_p, &[0, f.one(), 0]))
-    };
-    let printed = holds(&|at| {
+/// Output of the accelerometers, `C_n^p (-g^n) = -C_c^p C_n^c g^n`.
+fn output(at: &RandomPoint) -> Result<[u64; 3], AnalysisError> {
+    let f = &at.field;
+    let to_p = product(f, &small_turn(f, &at.vector(PSI)?, f.one(), true), &transpose(&at.attitude));
+    Ok(apply(f, &to_p, &[0, f.one(), 0]))
+}
+
+/// Audit of (5).
+fn output_line(seed: u64) -> Result<Line, AnalysisError> {
+    let printed = everywhere(ANY, seed, |at| {
         let (f, g) = (&at.field, at.vector(GRAVITY)?);
         Ok(output(at)? == negated(f, &apply(f, &transpose(&at.attitude), &g)))
     })?;
-    let mended = holds(&|at| {
+    let mended = everywhere(ANY, seed, |at| {
         let (f, g) = (&at.field, at.vector(GRAVITY)?);
         let c = small_turn(f, &at.vector(PSI)?, f.one(), true);
         let difference = sum(f, &output(at)?, &g);
         Ok(output(at)? == negated(f, &apply(f, &c, &g))
             && difference == negated(f, &cross(f, &g, &at.vector(PSI)?)))
     })?;
-    out.push(line(
+    Ok(line(
         "(5)",
         "Z_a = C_n^p (-g^n) = -C_n^c g^c",
         finding(printed),
@@ -282,32 +293,31 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
             plain(printed),
             if mended { "an identity, from which (6) follows" } else { "still none" }
         ),
-    ));
+    ))
+}
 
-    let from_n = holds(&|at| {
+/// Audit of (7): a platform that tracks n.
+fn tracking_line(seed: u64) -> Result<Line, AnalysisError> {
+    let from_n = everywhere(ANY, seed, |at| {
         let f = &at.field;
         Ok(apply(f, &transpose(&at.attitude), &[0, f.neg(f.one()), 0]) == at.vector(GRAVITY)?)
     })?;
     let from_c = |back: bool| {
-        holds(&|at| {
+        everywhere(ANY, seed, |at| {
             let (f, g) = (&at.field, at.vector(GRAVITY)?);
             let c = if back { transpose(&at.attitude) } else { at.attitude };
             Ok(apply(f, &c, &g) == g)
         })
     };
     let printed = from_c(true)? || from_c(false)?;
-    // omega_nc = omega_c - C_n^c omega_ie, at the omega_c of (7) or at a random one
-    let rate = |at: &RandomPoint, tracks: bool| -> Result<[u64; 3], AnalysisError> {
-        let f = &at.field;
-        let earth = apply(f, &transpose(&at.attitude), &at.vector(RATES)?);
-        let commanded = if tracks { earth } else { at.vector(["rx", "ry", "rz"])? };
-        Ok(sum(f, &commanded, &negated(f, &earth)))
-    };
     let turns = |tracks: bool| {
-        holds(&|at| Ok(product(&at.field, &at.attitude, &skew(&at.field, &rate(at, tracks)?)) == [[0; 3]; 3]))
+        everywhere(ANY, seed, |at| {
+            let rate = skew(&at.field, &rate_of_c(at, tracks)?);
+            Ok(product(&at.field, &at.attitude, &rate) == [[0; 3]; 3])
+        })
     };
     let stands = turns(true)? && !turns(false)?;
-    out.push(line(
+    Ok(line(
         "(7)",
         "omega_nc = 0, C_c^n' = 0, g^c = C_n^c(t) g^n = C_n^c(0) g^c, g^c' = 0",
         finding(stands && from_n && printed),
@@ -325,9 +335,12 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
                 "C_n^c g^c, is not g^c, nor is C_c^n g^c: read C_n^c(0) g^n"
             }
         ),
-    ));
+    ))
+}
 
-    let both = holds(&|at| {
+/// Audit of (8): the motion of psi in n.
+fn motion_line(seed: u64) -> Result<Line, AnalysisError> {
+    let both = everywhere(ANY, seed, |at| {
         let f = &at.field;
         let (earth, psi_n, eps_n) =
             (at.vector(RATES)?, at.vector(["px", "py", "pz"])?, at.vector(["ex", "ey", "ez"])?);
@@ -336,16 +349,20 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         let right = sum(f, &cross(f, &psi_n, &earth), &eps_n);
         Ok(apply(f, &at.attitude, &inner) == right && right == at.vector(["pxp", "pyp", "pzp"])?)
     })?;
-    out.push(line(
+    Ok(line(
         "(8)",
         "psi^n' = C_c^n ([psi x] C_n^c omega_ie^n + eps) = [psi^n x] omega_ie^n + eps^n",
         finding(both),
         format!("both members, and the model that is analysed: {}", plain(both)),
-    ));
+    ))
+}
 
-    let constant = |tracks: bool| holds(&|at| Ok(drift_rate(at, &rate(at, tracks)?)? == [0; 3]));
+/// Audit of (11): a constant drift.
+fn drift_line(seed: u64) -> Result<Line, AnalysisError> {
+    let constant =
+        |tracks: bool| everywhere(ANY, seed, |at| Ok(drift_rate(at, &rate_of_c(at, tracks)?)? == [0; 3]));
     let (still, turning) = (constant(true)?, constant(false)?);
-    out.push(line(
+    Ok(line(
         "(11)",
         "eps' = 0",
         finding(still && !turning),
@@ -356,10 +373,13 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
             if still { "zero" } else { "not zero" },
             if turning { "zero as well" } else { "not" }
         ),
-    ));
+    ))
+}
 
+/// Audit of (19): the elementary matrices of an attitude.
+fn attitude_line(seed: u64) -> Result<Line, AnalysisError> {
     let right = euler_conventions(seed)?;
-    out.push(line(
+    Ok(line(
         "(19)",
         "C_c^n = Mx(alpha) My(beta) Mz(gamma)",
         finding(right.contains(&0)),
@@ -369,6 +389,20 @@ pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
             if right.len() == 1 { "gives" } else { "give" },
             if right.contains(&0) { ": passive ones" } else { ", not passive ones" }
         ),
-    ));
+    ))
+}
+
+/// Lines of the equations that set up the model.
+///
+/// # Errors
+/// [`AnalysisError`].
+pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
+    let mut out = Vec::from(turn_lines(seed)?);
+    out.extend(mounting_lines(seed)?);
+    out.push(output_line(seed)?);
+    out.push(tracking_line(seed)?);
+    out.push(motion_line(seed)?);
+    out.push(drift_line(seed)?);
+    out.push(attitude_line(seed)?);
     Ok(out)
 }
