@@ -176,7 +176,7 @@ type Row = Vec<(u32, u64)>;
 /// Terms as entries of a matrix: column and coefficient.
 type MatrixRow = Vec<(usize, u64)>;
 
-/// MonomialColumns of a matrix: monomials, each once.
+/// Columns of a matrix: monomials, each once.
 #[derive(Default)]
 struct MonomialColumns {
     /// Column of every monomial; `usize::MAX` for one that does not occur.
@@ -211,7 +211,7 @@ impl MonomialColumns {
     }
 }
 
-/// MacaulayMatrix in row echelon form.
+/// Matrix in row echelon form.
 struct MacaulayMatrix {
     field: Field,
     /// Row of every pivot column.

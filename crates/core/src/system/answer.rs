@@ -399,34 +399,36 @@ fn number_of_solutions(count: Count, unique: bool) -> NumberOfSolutions {
     }
 }
 
+/// Verdict on unknown c, without its solutions.
+fn quantity(model: &SystemModel, judged: &Judgement, c: usize, unknown: &Unknown) -> SystemQuantity {
+    let (kind, named) = match unknown.role {
+        Role::State(i) => ("state", &model.states[i].named),
+        Role::Parameter(i) => ("parameter", &model.parameters[i]),
+        Role::UnknownInput(i) => ("input", &model.unknown_inputs[i].0),
+        // these roles are no unknowns
+        Role::KnownInput(_) | Role::Constant(_) | Role::Time => ("known", &model.states[0].named),
+    };
+    let Verdict { status, degree } = judged.verdict_on(c);
+    SystemQuantity {
+        name: unknown.name.clone(),
+        kind: kind.into(),
+        unit: named.unit.clone(),
+        description: named.description.clone(),
+        status,
+        degree,
+        partners: judged.findings.partners[c].iter().map(|&p| name_of(model, judged, p)).collect(),
+        solution: None,
+        number_of_solutions: None,
+        identifiability: Identifiability::NotDecided,
+    }
+}
+
 /// Answer for a judged model.
 fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> SystemAnalysis {
     let findings = &judged.findings;
     let name = |c: usize| name_of(model, judged, c);
     let shown = judged.layout.unknowns.iter().enumerate().filter(|&(c, _)| judged.shown(model, c));
-    let quantities = shown.map(|(c, u)| {
-        let (kind, named) = match u.role {
-            Role::State(i) => ("state", &model.states[i].named),
-            Role::Parameter(i) => ("parameter", &model.parameters[i]),
-            Role::UnknownInput(i) => ("input", &model.unknown_inputs[i].0),
-            // these roles are no unknowns
-            Role::KnownInput(_) | Role::Constant(_) | Role::Time => ("known", &model.states[0].named),
-        };
-        let Verdict { status, degree } = judged.verdict_on(c);
-        SystemQuantity {
-            name: u.name.clone(),
-            kind: kind.into(),
-            unit: named.unit.clone(),
-            description: named.description.clone(),
-            status,
-            degree,
-            partners: findings.partners[c].iter().map(|&p| name(p)).collect(),
-            solution: None,
-            number_of_solutions: None,
-            identifiability: Identifiability::NotDecided,
-        }
-    });
-    let quantities = quantities.map(SystemQuantity::with_identifiability);
+    let quantities = shown.map(|(c, u)| quantity(model, judged, c, u).with_identifiability());
     let asked = model.combinations.iter().zip(judged.asked());
     let primes = match judged.certainty {
         SystemCertainty::Primes(primes) => Some(primes),

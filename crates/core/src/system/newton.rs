@@ -57,12 +57,33 @@ impl Sum {
         }
         Self { node, terms }
     }
+
+    /// Sums of the positive and of the negative terms at a point, with their derivatives by all `lanes`.
+    fn sides<const N: usize>(
+        &self,
+        at: &Taylor<'_, Reals<N>>,
+        lanes: usize,
+    ) -> ([Ball<N>; 2], [Vec<Ball<N>>; 2]) {
+        let mut sides = [Ball::ZERO; 2];
+        let mut slopes = [vec![Ball::ZERO; lanes], vec![Ball::ZERO; lanes]];
+        for &(minus, term) in &self.terms {
+            let value = at.start(term).midpoint();
+            // counted on the side on which it is positive
+            let side = usize::from(minus != value.is_negative());
+            sides[side] = sides[side].add(&if value.is_negative() { value.neg() } else { value });
+            for (&lane, x) in at.lanes_of(term).iter().zip(at.dual(term, 0)) {
+                let x = if value.is_negative() { x.neg() } else { *x };
+                slopes[side][lane as usize] = slopes[side][lane as usize].add(&x);
+            }
+        }
+        (sides.map(|side| side.midpoint()), slopes)
+    }
 }
 
 /// Constraints and their derivatives at a point.
 struct Linear<const N: usize> {
     /// Rows of the constraints, in their order.
-    rows: Vec<Row<N>>,
+    rows: Vec<ConstraintRow<N>>,
     /// Largest residual relative to the terms of its constraint, as a power of two.
     off: f64,
     /// Index of the constraint with that residual.
@@ -78,9 +99,37 @@ struct Linear<const N: usize> {
     holds: bool,
 }
 
+impl<const N: usize> Linear<N> {
+    /// Adds the next constraint; `here` are the values of the slots by which it is derived.
+    fn add(&mut self, sum: &Sum, at: &Taylor<'_, Reals<N>>, here: &[Ball<N>]) {
+        let (sides, slopes) = sum.sides(at, here.len());
+        let row: Vec<Ball<N>> = slopes[0].iter().zip(&slopes[1]).map(|(a, b)| a.sub(b)).collect();
+        let ratio = ratio(&sides, &slopes);
+        // change of the constraint when its slots change by their size
+        let change = row.iter().zip(here).map(|(slope, x)| slope.size_log2() + x.size_log2().max(0.0));
+        let change = change.fold(f64::NEG_INFINITY, f64::max);
+        // both sides of x*y = x*z decrease on the way to x = 0
+        let scale = if ratio.is_some() { size(&sides).max(change) } else { change };
+        let value = at.start(sum.node);
+        let left = value.midpoint();
+        self.shift = self.shift.max(left.size_log2() - change);
+        self.residual = self.residual.max(left.size_log2());
+        let off = if left.is_zero() { f64::NEG_INFINITY } else { left.size_log2() - scale };
+        // rounding of the terms, and of their operands
+        let bits = Ball::<N>::BITS as f64;
+        let rounding = value.radius_log2().max(change - bits) - scale + 8.0;
+        self.holds &= off <= rounding.min(-bits / 2.0).max(24.0 - bits);
+        if off > self.off {
+            (self.off, self.worst) = (off, self.rows.len());
+        }
+        self.far = self.far.max(ratio.as_ref().map_or(0.0, |(_, log)| log.to_f64().abs()));
+        self.rows.push(ConstraintRow { sum: (row, left), ratio });
+    }
+}
+
 /// One constraint at a point: derivatives and value of the sum of its terms. If it has terms of both signs,
 /// also those of the logarithm of the ratio of the positive to the negative ones.
-struct Row<const N: usize> {
+struct ConstraintRow<const N: usize> {
     sum: (Vec<Ball<N>>, Ball<N>),
     ratio: Option<(Vec<Ball<N>>, Ball<N>)>,
 }
@@ -97,29 +146,9 @@ impl Newton<'_> {
     /// Constraints and their derivatives at a point; `None` if one is not defined, or beyond the limit of
     /// work.
     fn linear<const N: usize>(&self, values: &[Ball<N>]) -> Option<Linear<N>> {
-        let signal = |s: usize| Signal::Constant {
-            value: values[s],
-            lane: self.places.iter().position(|place| *place == s),
-        };
-        let signals = (0..values.len()).map(signal).collect();
-        let starts = vec![None; values.len()];
-        let roots: Vec<usize> =
-            self.sums.iter().flat_map(|s| s.terms.iter().map(|t| t.1).chain([s.node])).collect();
-        let lanes = self.places.len();
-        let at = Taylor::new(
-            self.dag,
-            Reals::<N>,
-            lanes,
-            signals,
-            &starts,
-            &roots,
-            false,
-            SplitMix64::new(0),
-            self.work,
-        );
-        let at = at.ok()?;
+        let at = self.series(values)?;
         // rank of the rows, their products, and the system of these
-        let (rows, columns) = (self.sums.len() as u64, lanes as u64);
+        let (rows, columns) = (self.sums.len() as u64, self.places.len() as u64);
         let pairs = rows.saturating_mul(rows).saturating_mul(rows.saturating_add(columns.saturating_mul(2)));
         self.work.take(Step::Constraints, pairs.saturating_mul(product::<Ball<N>>()), 0).ok()?;
         let here: Vec<Ball<N>> = self.places.iter().map(|&s| values[s]).collect();
@@ -133,43 +162,32 @@ impl Newton<'_> {
             far: 0.0,
             holds: true,
         };
-        for (c, sum) in self.sums.iter().enumerate() {
-            let mut sides = [Ball::ZERO; 2];
-            let mut slopes = [vec![Ball::ZERO; lanes], vec![Ball::ZERO; lanes]];
-            for &(minus, term) in &sum.terms {
-                let value = at.start(term).midpoint();
-                // counted on the side on which it is positive
-                let side = usize::from(minus != value.is_negative());
-                sides[side] = sides[side].add(&if value.is_negative() { value.neg() } else { value });
-                for (&lane, x) in at.lanes_of(term).iter().zip(at.dual(term, 0)) {
-                    let x = if value.is_negative() { x.neg() } else { *x };
-                    slopes[side][lane as usize] = slopes[side][lane as usize].add(&x);
-                }
-            }
-            let sides = sides.map(|side| side.midpoint());
-            let row: Vec<Ball<N>> = slopes[0].iter().zip(&slopes[1]).map(|(a, b)| a.sub(b)).collect();
-            let ratio = ratio(&sides, &slopes);
-            // change of the constraint when its slots change by their size
-            let change = row.iter().zip(&here).map(|(slope, x)| slope.size_log2() + x.size_log2().max(0.0));
-            let change = change.fold(f64::NEG_INFINITY, f64::max);
-            // both sides of x*y = x*z decrease on the way to x = 0
-            let scale = if ratio.is_some() { size(&sides).max(change) } else { change };
-            let value = at.start(sum.node);
-            let left = value.midpoint();
-            out.shift = out.shift.max(left.size_log2() - change);
-            out.residual = out.residual.max(left.size_log2());
-            let off = if left.is_zero() { f64::NEG_INFINITY } else { left.size_log2() - scale };
-            // rounding of the terms, and of their operands
-            let bits = Ball::<N>::BITS as f64;
-            let rounding = value.radius_log2().max(change - bits) - scale + 8.0;
-            out.holds &= off <= rounding.min(-bits / 2.0).max(24.0 - bits);
-            if off > out.off {
-                (out.off, out.worst) = (off, c);
-            }
-            out.far = out.far.max(ratio.as_ref().map_or(0.0, |(_, log)| log.to_f64().abs()));
-            out.rows.push(Row { sum: (row, left), ratio });
-        }
+        self.sums.iter().for_each(|sum| out.add(sum, &at, &here));
         Some(out)
+    }
+
+    /// Values and derivatives of all terms at a point.
+    fn series<const N: usize>(&self, values: &[Ball<N>]) -> Option<Taylor<'_, Reals<N>>> {
+        let signal = |s: usize| Signal::Constant {
+            value: values[s],
+            lane: self.places.iter().position(|place| *place == s),
+        };
+        let signals = (0..values.len()).map(signal).collect();
+        let starts = vec![None; values.len()];
+        let roots: Vec<usize> =
+            self.sums.iter().flat_map(|s| s.terms.iter().map(|t| t.1).chain([s.node])).collect();
+        let at = Taylor::new(
+            self.dag,
+            Reals::<N>,
+            self.places.len(),
+            signals,
+            &starts,
+            &roots,
+            false,
+            SplitMix64::new(0),
+            self.work,
+        );
+        at.ok()
     }
 
     /// Shortest step `J' y` with `J J' y = -g` for independent rows J; if `by_ratio`, of the logarithms
@@ -253,6 +271,48 @@ fn size<const N: usize>(list: &[Ball<N>]) -> f64 {
     list.iter().map(Ball::size_log2).fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// Lengths of the steps of Newton's method so far.
+struct StepHistory {
+    /// Length of the last step, as a power of two.
+    before: f64,
+    /// Distance from the constraints before the last step.
+    far_before: f64,
+    /// Number of successive slow steps.
+    slow: usize,
+    /// Residual and size of the point when the steps became slow.
+    from: (f64, f64),
+}
+
+impl Default for StepHistory {
+    fn default() -> Self {
+        Self { before: f64::INFINITY, far_before: f64::INFINITY, slow: 0, from: (f64::INFINITY, 0.0) }
+    }
+}
+
+impl StepHistory {
+    /// Counts a step of this length at a point of size `far`. True if the steps lead to a point with dependent
+    /// gradients.
+    fn end_at_dependent<const N: usize>(&mut self, linear: &Linear<N>, length: f64, far: f64) -> bool {
+        // near a point with dependent gradients the steps shrink by a constant factor, and so do both sides
+        let stays = linear.far > FAR && linear.far > self.far_before - GAIN / 2.0 && linear.shift < NEAR;
+        self.slow = if (linear.off < NEAR || stays) && length < SHORT && length > self.before - 2.0 {
+            self.slow + 1
+        } else {
+            0
+        };
+        if self.slow == 0 {
+            self.from = (linear.residual, far);
+        }
+        // towards a point residuals fall by more than a bit per step; away from all points they stay, or the
+        // values grow
+        let settles = self.from.0 - linear.residual >= SLOW as f64 && far < self.from.1 + 1.0;
+        // and fall below the residual that large values leave in a sum that is nowhere zero
+        let settles = settles && linear.residual < -4.0 * far - DEEP;
+        (self.before, self.far_before) = (length, linear.far);
+        self.slow >= SLOW && settles
+    }
+}
+
 /// Point near the values at which the constraints hold, by Newton's steps of least length in the `free`
 /// slots. The residual of the constraints is included in the error bounds of the values.
 ///
@@ -270,16 +330,14 @@ pub(super) fn hold_by_newton<const N: usize>(
         Newton { dag, sums: constraints.iter().map(|&node| Sum::new(dag, node)).collect(), places, work };
     // a refusal holds for all later steps
     let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(ConstraintFailure::Refused, |()| reason);
-    let (mut before, mut far_before, mut slow, mut stuck) = (f64::INFINITY, f64::INFINITY, 0, false);
-    // residual and size of the point when the steps became slow
-    let mut from = (f64::INFINITY, 0.0);
+    let (mut steps, mut stuck) = (StepHistory::default(), false);
     let mut linear = newton.linear(values).ok_or_else(|| failed(ConstraintFailure::Constraint(0)))?;
     for _ in 0..STEPS {
         let nowhere = ConstraintFailure::Constraint(linear.worst);
         if linear.far > FAR && !stuck {
             if let Some((there, next)) = newton.nearer(values, &linear) {
                 values.copy_from_slice(&there);
-                (linear, slow) = (next, 0);
+                (linear, steps.slow) = (next, 0);
                 continue;
             }
             stuck = true;
@@ -297,25 +355,9 @@ pub(super) fn hold_by_newton<const N: usize>(
         if length <= far - Ball::<N>::BITS as f64 + 8.0 {
             return Err(failed(nowhere));
         }
-        // near a point with dependent gradients the steps shrink by a constant factor, and so do both sides
-        let stays = linear.far > FAR && linear.far > far_before - GAIN / 2.0 && linear.shift < NEAR;
-        slow = if (linear.off < NEAR || stays) && length < SHORT && length > before - 2.0 {
-            slow + 1
-        } else {
-            0
-        };
-        if slow == 0 {
-            from = (linear.residual, far);
-        }
-        // towards a point residuals fall by more than a bit per step; away from all points they stay, or the
-        // values grow
-        let settles = from.0 - linear.residual >= SLOW as f64 && far < from.1 + 1.0;
-        // and fall below the residual that large values leave in a sum that is nowhere zero
-        let settles = settles && linear.residual < -4.0 * far - DEEP;
-        if slow >= SLOW && settles {
+        if steps.end_at_dependent(&linear, length, far) {
             return Err(ConstraintFailure::Dependent(linear.worst));
         }
-        (before, far_before) = (length, linear.far);
         let shorter = (length - far - LONGEST).max(0.0).ceil() as i64;
         let there = newton.after(values, &step, shorter);
         values.copy_from_slice(&there);

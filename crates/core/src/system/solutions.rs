@@ -291,6 +291,7 @@ fn roles_of_parameters(model: &SystemModel) -> impl Iterator<Item = Role> {
 }
 
 /// Symbols of a system, by their indices in the list.
+#[derive(Default)]
 struct Signals {
     symbols: Vec<Symbol>,
     /// Symbol of every slot; `None` for a slot without one.
@@ -328,71 +329,85 @@ impl Signals {
         if judged.layout.unknowns.len() > UNKNOWNS || highest > ORDER {
             return Err(NoExpressions::TooMany);
         }
-        let mut symbols: Vec<Symbol> = Vec::new();
-        let mut put = |raw: String, shown: String, node: Option<usize>, order: usize| {
-            symbols.push(Symbol { raw, shown, node, order });
-            symbols.len() - 1
-        };
-        let (mut states, mut parameters, mut inputs, mut slots) = (vec![], vec![], vec![], vec![]);
-        let mut time = None;
+        let mut out = Self::default();
+        let last = highest + 1 + BEYOND;
         for role in &compiled.roles {
-            let node = compiled.node_of(*role);
-            let symbol = match *role {
-                Role::State(i) => {
-                    states.push(put(raw(*role), model.states[i].named.name.clone(), node, 0));
-                    states.last().copied()
-                }
-                Role::Parameter(i) => {
-                    parameters.push(put(raw(*role), model.parameters[i].name.clone(), node, 0));
-                    parameters.last().copied()
-                }
-                Role::UnknownInput(i) => {
-                    parameters.push(put(raw(*role), model.unknown_inputs[i].0.name.clone(), node, 0));
-                    parameters.last().copied()
-                }
-                Role::Constant(i) => Some(put(raw(*role), model.constants[i].0.name.clone(), node, 0)),
-                Role::KnownInput(i) => {
-                    let (named, kind) = &model.known_inputs[i];
-                    let last = match kind {
-                        KnownInput::Polynomial(d) => (*d).min(highest + 1 + BEYOND),
-                        _ => highest + 1 + BEYOND,
-                    };
-                    let chain: Vec<usize> = (0..=last)
-                        .map(|k| put(format!("u_{i}_{k}"), derivative(&named.name, k), node, k))
-                        .collect();
-                    let first = chain.first().copied();
-                    inputs.push((chain, matches!(kind, KnownInput::Polynomial(d) if *d <= last)));
-                    first
-                }
-                Role::Time => {
-                    time = node.map(|_| put(raw(*role), "t".into(), node, 0));
-                    time
-                }
-            };
-            slots.push(symbol);
+            let symbol = out.add_slot(model, *role, compiled.node_of(*role), last);
+            out.slots.push(symbol);
         }
-        let mut outputs = Vec::new();
         for (j, &node) in compiled.outputs(0).iter().enumerate() {
-            let name = &model.outputs[j].0.name;
-            let chain = (0..=highest + 1 + BEYOND)
-                .map(|k| put(format!("y_{j}_{k}"), derivative(name, k), Some(node), k))
-                .collect();
-            outputs.push(chain);
+            let chain = out.chain(&format!("y_{j}"), &model.outputs[j].0.name, Some(node), last);
+            out.outputs.push(chain);
         }
-        let mut starts = Vec::new();
         for (i, s) in model.states.iter().enumerate().filter(|(_, s)| s.start != StateStart::Unknown) {
             let (node, shown) = (compiled.node_of(Role::State(i)), format!("{}(0)", s.named.name));
-            starts.push((i, put(format!("s_{i}"), shown, node, 0)));
+            let start = out.add(format!("s_{i}"), shown, node, 0);
+            out.starts.push((i, start));
         }
         let lane = |role: Role| judged.layout.unknowns.iter().position(|u| u.role == role);
-        let roles = (0..states.len()).map(Role::State).chain(roles_of_parameters(model));
-        let degrees = roles.map(|role| lane(role).and_then(|l| judged.findings.degrees.degree[l])).collect();
+        let roles = (0..out.states.len()).map(Role::State).chain(roles_of_parameters(model));
+        let degree = |role| lane(role).and_then(|l| judged.findings.degrees.degree[l]);
+        out.degrees = roles.map(degree).collect();
         let is_free = |role: Role| {
             lane(role).is_some_and(|l| judged.span.as_ref().is_some_and(|s| s.pivots().all(|p| p != l)))
         };
         let free = roles_of_parameters(model).enumerate().filter(|(_, role)| is_free(*role));
-        let free = free.map(|(p, _)| p).collect();
-        Ok(Self { symbols, slots, states, parameters, outputs, inputs, time, starts, degrees, free })
+        out.free = free.map(|(p, _)| p).collect();
+        Ok(out)
+    }
+
+    /// Appends a symbol; returns its index.
+    fn add(&mut self, raw: String, shown: String, node: Option<usize>, order: usize) -> usize {
+        self.symbols.push(Symbol { raw, shown, node, order });
+        self.symbols.len() - 1
+    }
+
+    /// Appends the symbols of a signal and its derivatives up to the order `last`.
+    fn chain(&mut self, raw: &str, name: &str, node: Option<usize>, last: usize) -> Vec<usize> {
+        (0..=last).map(|k| self.add(format!("{raw}_{k}"), derivative(name, k), node, k)).collect()
+    }
+
+    /// Appends the symbols of a slot, of a known input up to the order `last`; returns that of its value.
+    fn add_slot(
+        &mut self,
+        model: &SystemModel,
+        role: Role,
+        node: Option<usize>,
+        last: usize,
+    ) -> Option<usize> {
+        match role {
+            Role::State(i) => {
+                let symbol = self.add(raw(role), model.states[i].named.name.clone(), node, 0);
+                self.states.push(symbol);
+                Some(symbol)
+            }
+            Role::Parameter(i) => {
+                let symbol = self.add(raw(role), model.parameters[i].name.clone(), node, 0);
+                self.parameters.push(symbol);
+                Some(symbol)
+            }
+            Role::UnknownInput(i) => {
+                let symbol = self.add(raw(role), model.unknown_inputs[i].0.name.clone(), node, 0);
+                self.parameters.push(symbol);
+                Some(symbol)
+            }
+            Role::Constant(i) => Some(self.add(raw(role), model.constants[i].0.name.clone(), node, 0)),
+            Role::KnownInput(i) => {
+                let (named, kind) = &model.known_inputs[i];
+                let last = match kind {
+                    KnownInput::Polynomial(d) => (*d).min(last),
+                    _ => last,
+                };
+                let chain = self.chain(&format!("u_{i}"), &named.name, node, last);
+                let first = chain.first().copied();
+                self.inputs.push((chain, matches!(kind, KnownInput::Polynomial(d) if *d <= last)));
+                first
+            }
+            Role::Time => {
+                self.time = node.map(|_| self.add(raw(role), "t".into(), node, 0));
+                self.time
+            }
+        }
     }
 }
 
