@@ -15,7 +15,8 @@ use crate::arguments::Given;
 use crate::calibrate::{Calibrate, calibrate};
 use crate::compare::{Compare, compare};
 use crate::crosscheck::{Crosscheck, crosscheck, files as crosscheck_files};
-use crate::design::{Designed, Search, SearchFiles, design};
+use crate::design::{Search, SearchFiles, design};
+use crate::designed::Designed;
 use crate::host::Host;
 use crate::paper::{Paper, paper};
 use crate::problem::Problem;
@@ -247,56 +248,18 @@ pub fn call(command: &str, request: &str, host: &mut Host<'_>) -> Result<Answere
     object(request).and_then(|request| answered::<AllFormats>(command, request, host)).map_err(in_snake_case)
 }
 
+/// Answer to a command in a form.
 fn answered<W: OutputForm>(
     command: &str,
     request: Map<String, Value>,
     host: &mut Host<'_>,
 ) -> Result<W::Out, Problem> {
     match command {
-        "analyze" => {
-            let mut asked: Request<Analyze, Sources> = Request::read(request)?;
-            asked.options.input.given = asked.given;
-            let read = asked.options.input.read(asked.files.sources)?;
-            let judged = analyze(&asked.options, &read, host)?;
-            let wanted = asked.options.certificate;
-            let certificate = wanted.then(|| certificate(&asked.options, &read)).transpose()?;
-            let reduced = asked.options.reduced.then(|| reduced_model(&asked.options, &read)).transpose()?;
-            W::whole(judged, true, move |_, _| {
-                let own = certificate.clone().into_iter().chain(reduced.clone());
-                Ok(position_figures(&read).into_iter().chain(own).collect())
-            })
-        }
-        "simulate" => {
-            let mut asked: Request<Simulate, Sources> = Request::read(request)?;
-            asked.options.input.given = asked.given;
-            let input = asked.options.input.read_one(asked.files.sources)?;
-            let (run, traces) = simulate(&asked.options, &input)?;
-            W::whole(run, true, move |run, pictures| Ok(simulation_files(run, &traces, pictures)?))
-        }
-        "crosscheck" => {
-            let mut asked: Request<Crosscheck, Sources> = Request::read(request)?;
-            asked.options.input.given = asked.given;
-            let input = asked.options.input.read_one(asked.files.sources)?;
-            let evidence = crosscheck(&asked.options, &input, host)?;
-            let passed = evidence.passed();
-            W::whole(evidence, passed, drawn(crosscheck_files))
-        }
-        "procedure" => {
-            let mut asked: Request<Procedure, Planning> = Request::read(request)?;
-            asked.options.input.given = asked.given;
-            let Planning { sources, rotations } = asked.files;
-            let planned = procedure(&asked.options, sources, rotations.as_ref())?;
-            let passed = planned.sheet.executable;
-            W::whole(planned.sheet.clone(), passed, move |_, _| planned.files())
-        }
-        "calibrate" => {
-            let mut asked: Request<Calibrate, Records> = Request::read(request)?;
-            asked.options.given = asked.given;
-            let Records { sources, records, before } = asked.files;
-            let source = one(sources)?;
-            let records = records.into_iter().map(of_text).collect::<Result<_, _>>()?;
-            calibrated::<W>(&asked.options, source, records, before.as_ref(), host)
-        }
+        "analyze" => analyzed::<W>(request, host),
+        "simulate" => simulated::<W>(request),
+        "crosscheck" => crosschecked::<W>(request, host),
+        "procedure" => planned::<W>(request),
+        "calibrate" => calibrated_from_texts::<W>(request, host),
         "allan" => {
             let asked: Request<Allan, StaticRecords> = Request::read(request)?;
             let records = asked.files.records.into_iter().map(of_text).collect::<Result<_, _>>()?;
@@ -306,29 +269,8 @@ fn answered<W: OutputForm>(
             let asked: Request<Compare, Sources> = Request::read(request)?;
             W::whole(compare(&asked.options, read(asked.files.sources)?)?, true, none)
         }
-        "design" => {
-            let asked: Request<Search, SearchFiles> = Request::read(request)?;
-            match design(&asked.options, &asked.files, host)? {
-                Designed::Schemes(found) => W::whole(*found, true, |f, pictures| f.files(pictures)),
-                Designed::Walks(found) => W::whole(*found, true, |f, _| Ok(f.files())),
-                Designed::Outputs(found) => W::whole(*found, true, drawn(sensor_figures)),
-                Designed::Next(found) => W::whole(*found, true, drawn(next_figures)),
-                Designed::Part(part) => {
-                    let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
-                    W::text(json + "\n", part.complete)
-                }
-            }
-        }
-        "report" => {
-            let mut asked: Request<Report, Pages> = Request::read(request)?;
-            asked.options.given = asked.given.without("runs");
-            let Pages { sources, calibrations, command } = asked.files;
-            let origin = origin(command, sources.iter().chain(calibrations.iter().map(|c| &c.source)));
-            let reviewed = report(&asked.options, read(sources)?, &calibrations, host)?;
-            let files = reviewed.files(&origin, ReviewFormat::Html, &picture_folder("review"))?;
-            let page = files.into_iter().next().map(|page| page.bytes).unwrap_or_default();
-            W::text(String::from_utf8(page).map_err(|e| Problem::internal(e.to_string()))?, true)
-        }
+        "design" => designed::<W>(request, host),
+        "report" => reviewed::<W>(request, host),
         "paper" => {
             let asked: Request<Paper, NoFiles> = Request::read(request)?;
             W::whole(paper(&asked.options)?, true, none)
@@ -337,6 +279,90 @@ fn answered<W: OutputForm>(
             Err(Problem::input(format!("`{command}` is no command; expected one of {}", COMMANDS.join(", "))))
         }
     }
+}
+
+/// Verdicts on schemes and models.
+fn analyzed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
+    let mut asked: Request<Analyze, Sources> = Request::read(request)?;
+    asked.options.input.given = asked.given;
+    let read = asked.options.input.read(asked.files.sources)?;
+    let judged = analyze(&asked.options, &read, host)?;
+    let wanted = asked.options.certificate;
+    let certificate = wanted.then(|| certificate(&asked.options, &read)).transpose()?;
+    let reduced = asked.options.reduced.then(|| reduced_model(&asked.options, &read)).transpose()?;
+    W::whole(judged, true, move |_, _| {
+        let own = certificate.clone().into_iter().chain(reduced.clone());
+        Ok(position_figures(&read).into_iter().chain(own).collect())
+    })
+}
+
+/// A simulated run.
+fn simulated<W: OutputForm>(request: Map<String, Value>) -> Result<W::Out, Problem> {
+    let mut asked: Request<Simulate, Sources> = Request::read(request)?;
+    asked.options.input.given = asked.given;
+    let input = asked.options.input.read_one(asked.files.sources)?;
+    let (run, traces) = simulate(&asked.options, &input)?;
+    W::whole(run, true, move |run, pictures| Ok(simulation_files(run, &traces, pictures)?))
+}
+
+/// Evidence on a scheme or a model.
+fn crosschecked<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
+    let mut asked: Request<Crosscheck, Sources> = Request::read(request)?;
+    asked.options.input.given = asked.given;
+    let input = asked.options.input.read_one(asked.files.sources)?;
+    let evidence = crosscheck(&asked.options, &input, host)?;
+    let passed = evidence.passed();
+    W::whole(evidence, passed, drawn(crosscheck_files))
+}
+
+/// The sheet of a run.
+fn planned<W: OutputForm>(request: Map<String, Value>) -> Result<W::Out, Problem> {
+    let mut asked: Request<Procedure, Planning> = Request::read(request)?;
+    asked.options.input.given = asked.given;
+    let Planning { sources, rotations } = asked.files;
+    let planned = procedure(&asked.options, sources, rotations.as_ref())?;
+    let passed = planned.sheet.executable;
+    W::whole(planned.sheet.clone(), passed, move |_, _| planned.files())
+}
+
+/// A calibration from records that are texts.
+fn calibrated_from_texts<W: OutputForm>(
+    request: Map<String, Value>,
+    host: &mut Host<'_>,
+) -> Result<W::Out, Problem> {
+    let mut asked: Request<Calibrate, Records> = Request::read(request)?;
+    asked.options.given = asked.given;
+    let Records { sources, records, before } = asked.files;
+    let source = one(sources)?;
+    let records = records.into_iter().map(of_text).collect::<Result<_, _>>()?;
+    calibrated::<W>(&asked.options, source, records, before.as_ref(), host)
+}
+
+/// Found schemes, or sets of outputs.
+fn designed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
+    let asked: Request<Search, SearchFiles> = Request::read(request)?;
+    match design(&asked.options, &asked.files, host)? {
+        Designed::Schemes(found) => W::whole(*found, true, |f, pictures| f.files(pictures)),
+        Designed::Walks(found) => W::whole(*found, true, |f, _| Ok(f.files())),
+        Designed::Outputs(found) => W::whole(*found, true, drawn(sensor_figures)),
+        Designed::Next(found) => W::whole(*found, true, drawn(next_figures)),
+        Designed::Part(part) => {
+            let json = serde_json::to_string(&part).map_err(|e| Problem::internal(e.to_string()))?;
+            W::text(json + "\n", part.complete)
+        }
+    }
+}
+
+/// The page of a review.
+fn reviewed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
+    let mut asked: Request<Report, Pages> = Request::read(request)?;
+    asked.options.given = asked.given.without("runs");
+    let Pages { sources, calibrations, command } = asked.files;
+    let origin = origin(command, sources.iter().chain(calibrations.iter().map(|c| &c.source)));
+    let reviewed = report(&asked.options, read(sources)?, &calibrations, host)?;
+    let files = reviewed.files(&origin, ReviewFormat::Html, &picture_folder("review"))?;
+    let page = files.into_iter().next().map(|page| page.bytes).unwrap_or_default();
+    W::text(String::from_utf8(page).map_err(|e| Problem::internal(e.to_string()))?, true)
 }
 
 /// Files of most commands: schemes and models.

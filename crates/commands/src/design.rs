@@ -7,23 +7,22 @@ use std::ops::RangeInclusive;
 
 use clap::{ArgGroup, Args};
 use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
-use obsdeg_core::model::scheme_file::write;
 use obsdeg_core::model::{Angle, Carry, Scheme, parse_decimal};
 use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignError, DesignOptions, Found, Immune, Part, Progress,
-    WalkOptions, Walks, asked as asked_conditions, certify_optimum, check_certifiable, design_merged,
-    design_part, is_walk, scheme_found, scheme_of_walk, walks,
+    Candidates, CriterionName, Design, DesignOptions, Immune, Part, Progress, WalkOptions,
+    asked as asked_conditions, certify_optimum, check_certifiable, design_merged, design_part, is_walk,
+    walks,
 };
 use obsdeg_design::next::{NextOptions, NextPositions};
 use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::simulation::Conditions;
-use obsdeg_report::{Answer, Document, Excess, File, Table, design_figures, position_figure, visible};
+use obsdeg_report::File;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::analyze::certificate_digest;
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
+use crate::designed::{Designed, Searched, Walked};
 use crate::host::{Host, Now};
 use crate::measure::{MeasureOptions, SetRequirements, measured};
 use crate::next::{FurtherOptions, calibrated, check_further, further};
@@ -327,86 +326,6 @@ pub struct SearchFiles {
     pub after: Option<Source>,
 }
 
-/// Result of a search.
-#[derive(Debug, Serialize)]
-#[serde(untagged)]
-pub enum Designed {
-    /// Schemes.
-    Schemes(Box<Searched>),
-    /// Fewest positions where the slew path between them counts.
-    Walks(Box<Walked>),
-    /// Part of a search.
-    Part(Box<Part>),
-    /// Sets of outputs of a model.
-    Outputs(Box<Sensors>),
-    /// Further positions of a scheme.
-    Next(Box<NextPositions>),
-}
-
-/// Found schemes, with the base scheme and the conditions of the search.
-#[derive(Debug, Serialize)]
-#[serde(transparent)]
-pub struct Searched {
-    /// Found schemes.
-    pub found: Design,
-    #[serde(skip)]
-    base: Scheme,
-    #[serde(skip)]
-    conditions: Conditions,
-    #[serde(skip)]
-    certificate: Option<File>,
-}
-
-/// Found slew sequences, with the base scheme of the search.
-#[derive(Debug, Serialize)]
-#[serde(transparent)]
-pub struct Walked {
-    /// Found slew sequences.
-    pub found: Walks,
-    #[serde(skip)]
-    base: Scheme,
-}
-
-impl Answer for Searched {
-    fn layout(&self) -> Option<&str> {
-        self.found.layout()
-    }
-
-    fn document(&self) -> Document {
-        self.found.document()
-    }
-
-    fn sentences(&self) -> Vec<String> {
-        self.found.sentences()
-    }
-
-    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
-        self.found.tables()
-    }
-
-    fn main_table(&self) -> &'static str {
-        self.found.main_table()
-    }
-}
-
-impl Answer for Walked {
-    fn layout(&self) -> Option<&str> {
-        self.found.layout()
-    }
-
-    fn document(&self) -> Document {
-        self.found.document()
-    }
-
-    fn tables(&self) -> Result<Vec<Table>, serde_json::Error> {
-        self.found.tables()
-    }
-
-    fn main_table(&self) -> &'static str {
-        self.found.main_table()
-    }
-}
-
 /// Searches schemes, or sets of outputs of a model.
 ///
 /// # Errors
@@ -421,56 +340,10 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let asked = known(a, files)?;
     let files = &SearchFiles { merge: files.merge.clone(), ..asked.files(files) };
     let a = &asked.options;
-    match (a.positions, a.minimum) {
-        (None, false) => {
-            return Err(Problem::input(
-                "nothing to search; expected --positions K, --minimum, or a scheme file with as many positions",
-            ));
-        }
-        (Some(_), true) => {
-            return Err(Problem::input("found --positions beside --minimum; expected one of them"));
-        }
-        _ => {}
-    }
-    if let Some([i, n]) = a.part.filter(|[i, n]| !(1..=*n).contains(i)) {
-        return Err(Problem::input(format!("--part {i}/{n}: expected a part such as 2/7")));
-    }
-    if let Some(within) = a.within.filter(|x| !(0.0..=100.0).contains(x)) {
-        return Err(Problem::input(format!("--within {within}: expected 0 to 100 percent")));
-    }
-    for k in a.positions.iter().chain(&a.front) {
-        check_whole("--positions", *k as u64, &POSITIONS)?;
-    }
-    a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
-    a.restarts.map_or(Ok(()), |restarts| check_whole("--restarts", restarts, &RESTARTS))?;
-    a.check.map_or(Ok(()), |blocks| check_whole("--check", blocks, &CHECKED))?;
+    check_values(a)?;
     let (base, candidates, conditions) = assumed(a, files)?;
     idle(a, !files.merge.is_empty(), &base, &conditions)?;
-    let round = a.round.as_deref().unwrap_or("5");
-    let step = parse_decimal(round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
-    let step = step.ok_or_else(|| {
-        Problem::input(format!("--round {round}: expected degrees above 0 and up to 90, as in 5"))
-    })?;
-    let options = DesignOptions {
-        candidates,
-        positions: a.positions,
-        required: a.wanted.observable.clone(),
-        degree_caps: a.wanted.degree_caps()?,
-        immune: a.wanted.immune.clone(),
-        meet: a.wanted.meet,
-        total_s: a.wanted.max_time,
-        slew_s: a.wanted.max_slew,
-        criterion: a.wanted.criterion.unwrap_or_default(),
-        keep: a.keep.unwrap_or(10).into(),
-        restarts: a.restarts.unwrap_or(200),
-        refine: a.refine,
-        divide: a.divide,
-        front: a.front.clone(),
-        within: a.within.map(|percent| percent / 100.0),
-        everywhere: true,
-        free: (a.candidates == "free").then_some(step),
-        seed: a.seed,
-    };
+    let options = design_options(a, candidates)?;
     if a.max_turn.is_some() && !(a.minimum && is_walk(&base)) {
         return Err(Problem::input(
             "--max-turn is for --minimum with torquer errors (GS, GM, GM3) under inertial carry",
@@ -506,6 +379,63 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
         a.certificate.then(|| proof(&base, &conditions, &options, &found, &progress)).transpose()?;
     let conditions = asked_conditions(&base, &conditions, &options.required)?;
     Ok(Designed::Schemes(Box::new(Searched { found, base, conditions, certificate })))
+}
+
+/// Checks the numbers among the options of a search.
+fn check_values(a: &Search) -> Result<(), Problem> {
+    match (a.positions, a.minimum) {
+        (None, false) => {
+            return Err(Problem::input(
+                "nothing to search; expected --positions K, --minimum, or a scheme file with as many positions",
+            ));
+        }
+        (Some(_), true) => {
+            return Err(Problem::input("found --positions beside --minimum; expected one of them"));
+        }
+        _ => {}
+    }
+    if let Some([i, n]) = a.part.filter(|[i, n]| !(1..=*n).contains(i)) {
+        return Err(Problem::input(format!("--part {i}/{n}: expected a part such as 2/7")));
+    }
+    if let Some(within) = a.within.filter(|x| !(0.0..=100.0).contains(x)) {
+        return Err(Problem::input(format!("--within {within}: expected 0 to 100 percent")));
+    }
+    for k in a.positions.iter().chain(&a.front) {
+        check_whole("--positions", *k as u64, &POSITIONS)?;
+    }
+    a.keep.map_or(Ok(()), |keep| check_whole("--keep", keep, &KEPT))?;
+    a.restarts.map_or(Ok(()), |restarts| check_whole("--restarts", restarts, &RESTARTS))?;
+    a.check.map_or(Ok(()), |blocks| check_whole("--check", blocks, &CHECKED))?;
+    Ok(())
+}
+
+/// Options of the search itself.
+fn design_options(a: &Search, candidates: Candidates) -> Result<DesignOptions, Problem> {
+    let round = a.round.as_deref().unwrap_or("5");
+    let step = parse_decimal(round.trim()).ok().filter(|step| (1..=90_000_000_000).contains(step));
+    let step = step.ok_or_else(|| {
+        Problem::input(format!("--round {round}: expected degrees above 0 and up to 90, as in 5"))
+    })?;
+    Ok(DesignOptions {
+        candidates,
+        positions: a.positions,
+        required: a.wanted.observable.clone(),
+        degree_caps: a.wanted.degree_caps()?,
+        immune: a.wanted.immune.clone(),
+        meet: a.wanted.meet,
+        total_s: a.wanted.max_time,
+        slew_s: a.wanted.max_slew,
+        criterion: a.wanted.criterion.unwrap_or_default(),
+        keep: a.keep.unwrap_or(10).into(),
+        restarts: a.restarts.unwrap_or(200),
+        refine: a.refine,
+        divide: a.divide,
+        front: a.front.clone(),
+        within: a.within.map(|percent| percent / 100.0),
+        everywhere: true,
+        free: (a.candidates == "free").then_some(step),
+        seed: a.seed,
+    })
 }
 
 /// Further positions of the scheme in a file.
@@ -686,29 +616,7 @@ fn known(a: &Search, files: &SearchFiles) -> Result<Asked, Problem> {
 fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Result<(), Problem> {
     let (w, free) = (&a.wanted, a.candidates == "free");
     if a.minimum {
-        let of_positions = [
-            ("--keep", a.keep.is_some()),
-            ("--restarts", a.restarts.is_some()),
-            ("--within", a.within.is_some()),
-            ("--refine", a.refine),
-            ("--divide", a.divide),
-            ("--front", !a.front.is_empty()),
-            ("--round", a.round.is_some()),
-            ("--max-degree", !w.max_degree.is_empty()),
-            ("--immune", !w.immune.is_empty()),
-            ("--criterion", w.criterion.is_some()),
-            ("--meet", w.meet),
-            ("--max-time", w.max_time.is_some()),
-            ("--max-slew", w.max_slew.is_some()),
-            ("--slew-rate", w.slew_rate.is_some()),
-        ];
-        let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
-        if let Some(option) = given.chain(a.measurement.given()).next() {
-            return Err(Problem::input(format!(
-                "{option} does nothing with --minimum, which asks what positions determine at all, by any \
-                 degree and with any noise; it is for --positions"
-            )));
-        }
+        idle_with_minimum(a)?;
     }
     let others = [
         ("--check", a.check.is_some() && !merged, "--merge with it, whose parts are checked"),
@@ -745,6 +653,35 @@ fn idle(a: &Search, merged: bool, base: &Scheme, conditions: &Conditions) -> Res
         }
         None => Ok(()),
     }
+}
+
+/// Refuses options that concern a number of positions beside `--minimum`.
+fn idle_with_minimum(a: &Search) -> Result<(), Problem> {
+    let w = &a.wanted;
+    let of_positions = [
+        ("--keep", a.keep.is_some()),
+        ("--restarts", a.restarts.is_some()),
+        ("--within", a.within.is_some()),
+        ("--refine", a.refine),
+        ("--divide", a.divide),
+        ("--front", !a.front.is_empty()),
+        ("--round", a.round.is_some()),
+        ("--max-degree", !w.max_degree.is_empty()),
+        ("--immune", !w.immune.is_empty()),
+        ("--criterion", w.criterion.is_some()),
+        ("--meet", w.meet),
+        ("--max-time", w.max_time.is_some()),
+        ("--max-slew", w.max_slew.is_some()),
+        ("--slew-rate", w.slew_rate.is_some()),
+    ];
+    let given = of_positions.into_iter().filter_map(|(option, given)| given.then_some(option));
+    if let Some(option) = given.chain(a.measurement.given()).next() {
+        return Err(Problem::input(format!(
+            "{option} does nothing with --minimum, which asks what positions determine at all, by any \
+             degree and with any noise; it is for --positions"
+        )));
+    }
+    Ok(())
 }
 
 /// Reads a part of a search; refuses a file that was changed after it was written.
@@ -811,96 +748,4 @@ fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates),
 /// True if `--candidates` is one of its words and not the path of a file.
 pub fn is_word(candidates: &str) -> bool {
     candidates == CARDINAL || candidates == "free" || candidates.starts_with("grid:")
-}
-
-impl Walked {
-    /// Files beside the JSON: the found scheme.
-    pub fn files(&self) -> Vec<File> {
-        let scheme = scheme_of_walk(&self.found, &self.base);
-        let file = |s: Scheme| File { name: "winner.toml".into(), bytes: write(&s).into_bytes() };
-        scheme.map(file).into_iter().collect()
-    }
-}
-
-impl Searched {
-    /// Takes the requested certificate out of the files of the answer.
-    pub fn take_certificate(&mut self) -> Option<File> {
-        self.certificate.take()
-    }
-
-    /// Files beside the JSON: the best scheme, and with `pictures` its positions and the front.
-    ///
-    /// # Errors
-    /// [`Problem`] of a figure that cannot be drawn.
-    pub fn files(&self, pictures: bool) -> Result<Vec<File>, Problem> {
-        let Self { found, base, conditions, certificate } = self;
-        let mut files: Vec<File> = certificate.iter().cloned().collect();
-        if let Some(best) = found.found.first() {
-            let bytes = scheme_file(found, best, base, conditions)?.into_bytes();
-            files.push(File { name: "winner.toml".into(), bytes });
-            if pictures {
-                files.push(position_figure(&scheme_found(best, base, conditions)?));
-            }
-        }
-        if pictures {
-            files.extend(design_figures(found)?);
-        }
-        Ok(files)
-    }
-}
-
-/// Found scheme, as a file that `obsdeg analyze --scheme` reads.
-fn scheme_file(
-    found: &Design,
-    best: &Found,
-    base: &Scheme,
-    conditions: &Conditions,
-) -> Result<String, DesignError> {
-    let as_searched = !best.refined && best.dwells_s.is_empty();
-    let proven = found.search.as_ref().is_some_and(|s| s.proven) && as_searched;
-    let certificate = found.search.as_ref().and_then(|s| s.certificate.as_ref()).filter(|_| as_searched);
-    let proven = match (proven, certificate) {
-        (true, _)
-            if found.search.as_ref().and_then(|s| s.parts.as_ref()).is_some_and(|p| !p.is_repeated()) =>
-        {
-            "proven best (if the parts were searched as they state)".into()
-        }
-        (true, _) => "proven best".into(),
-        (false, Some(c)) => {
-            let excess = Excess::new(best.value, c.best_possible, c.within_percent);
-            format!("within {} of the best possible", excess.percent)
-        }
-        (false, None) => "best found".to_string(),
-    };
-    let positions = best.positions.iter().enumerate().map(|(i, name)| format!("p{} {name}", i + 1));
-    let positions = positions.collect::<Vec<_>>().join(", ");
-    let scheme = scheme_found(best, base, conditions)?;
-    let all = found.required.len() + 3 >= best.rank[1];
-    let what = if all { "all coefficients".into() } else { found.required.join(", ") };
-    let search = found.search.as_ref();
-    let unit = search.and_then(|s| s.unit.as_deref());
-    let prior = search.and_then(|s| s.prior.as_ref());
-    let prior = prior.map_or_else(|| "no prior".into(), |p| format!("prior {}", visible(p)));
-    let noisy = conditions.as_stated().drift_noise_in_words().is_some() || !conditions.gyro_noise.is_none();
-    let drift = if noisy { "the random drift below" } else { "no random drift" };
-    let digest = certificate_digest(&scheme);
-    let digest = digest.map_or_else(|_| String::new(), |hex| format!("# sha256 of its certificate: {hex}\n"));
-    let name = search.map_or("", |s| s.criterion.as_str());
-    let largest = |sigma: f64| format!("largest sigma of {what} {sigma:.3e} deg/h (per g)");
-    let reached = match (unit, best.worst_sigma_dph) {
-        (Some("deg/h"), Some(sigma)) if name == "worst" => largest(sigma),
-        (unit, sigma) => {
-            let own = unit.map_or_else(String::new, |u| format!(" {u}"));
-            let sigma = sigma.filter(|_| unit == Some("deg/h")).map(|s| format!("; {}", largest(s)));
-            format!("criterion {name} of {what} {:.3e}{own}{}", best.value, sigma.unwrap_or_default())
-        }
-    };
-    Ok(format!(
-        "# {proven} of {} candidates: {reached} in {:.0} s, {prior}, {drift}, seed {}\n# {}\n{digest}{}",
-        found.candidates.len(),
-        best.total_s,
-        found.seed,
-        visible(&positions),
-        write(&scheme)
-    ))
 }

@@ -23,6 +23,7 @@ mod compare;
 mod conditions;
 mod crosscheck;
 mod design;
+mod designed;
 mod host;
 mod measure;
 mod next;
@@ -42,9 +43,8 @@ pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_allan, call_cali
 pub use compare::{Compare, compare};
 pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions, RequirementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};
-pub use design::{
-    DegreeCap, Designed, Search, SearchFiles, Searched, Walked, WantedOptions, design, is_word,
-};
+pub use design::{DegreeCap, Search, SearchFiles, WantedOptions, design, is_word};
+pub use designed::{Designed, Searched, Walked};
 pub use host::{Host, Now};
 pub use measure::MeasureOptions;
 pub use next::FurtherOptions;

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::io::Cursor;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -269,37 +269,56 @@ fn in_threads(
                 // the receiver is gone only if this function has returned
                 let _ = send.send(pool.install(answered));
             });
-            let mut inside = None;
-            let mut asked = 0;
-            loop {
-                match receive.recv_timeout(INTERVAL) {
-                    Ok(done) => return (Some(done), inside),
-                    Err(RecvTimeoutError::Disconnected) => return (None, inside),
-                    Err(RecvTimeoutError::Timeout) if inside.is_some() => {}
-                    Err(RecvTimeoutError::Timeout) => {
-                        asked += 1;
-                        let silent = Now {
-                            what: "tenths of a second".into(),
-                            done: asked,
-                            total: None,
-                            examined: None,
-                            best: None,
-                        };
-                        let now =
-                            last.lock().ok().and_then(|mut last| last.take()).or((!ends).then_some(silent));
-                        match goes_on(progress.as_ref(), now) {
-                            Ok(true) => {}
-                            Ok(false) => wanted.store(false, Ordering::Relaxed),
-                            Err(e) => {
-                                wanted.store(false, Ordering::Relaxed);
-                                inside = Some(e);
-                            }
-                        }
+            waited(&receive, progress.as_ref(), &last, &wanted, ends)
+        })
+    });
+    outcome(py, done, inside)
+}
+
+/// Result of work on other threads; `None` if it was cut short.
+type Done = Option<Result<Answered, Problem>>;
+
+/// Waits for the work, and asks Python ten times a second, until Python raises an error. Gives the result,
+/// `None` if the work ended without one, and the error.
+fn waited(
+    receive: &Receiver<Done>,
+    progress: Option<&Py<PyAny>>,
+    last: &Mutex<Option<Now>>,
+    wanted: &AtomicBool,
+    ends: bool,
+) -> (Option<Done>, Option<PyErr>) {
+    let mut inside = None;
+    let mut asked = 0;
+    loop {
+        match receive.recv_timeout(INTERVAL) {
+            Ok(done) => return (Some(done), inside),
+            Err(RecvTimeoutError::Disconnected) => return (None, inside),
+            Err(RecvTimeoutError::Timeout) if inside.is_some() => {}
+            Err(RecvTimeoutError::Timeout) => {
+                asked += 1;
+                let silent = Now {
+                    what: "tenths of a second".into(),
+                    done: asked,
+                    total: None,
+                    examined: None,
+                    best: None,
+                };
+                let now = last.lock().ok().and_then(|mut last| last.take()).or((!ends).then_some(silent));
+                match goes_on(progress, now) {
+                    Ok(true) => {}
+                    Ok(false) => wanted.store(false, Ordering::Relaxed),
+                    Err(e) => {
+                        wanted.store(false, Ordering::Relaxed);
+                        inside = Some(e);
                     }
                 }
             }
-        })
-    });
+        }
+    }
+}
+
+/// Answer from the result of the work and the error that Python raised meanwhile.
+fn outcome(py: Python<'_>, done: Option<Done>, inside: Option<PyErr>) -> PyResult<Answer> {
     match (done, inside) {
         (None, _) => Err(PyRuntimeError::new_err("the work ended without an answer")),
         (Some(Some(Ok(answer))), None) => Ok(Answer(answer)),

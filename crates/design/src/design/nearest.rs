@@ -46,7 +46,6 @@ fn margin(of: &Found) -> String {
 /// One line per change that meets the requirements, or that was tried.
 impl fmt::Display for Nearest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let route = |found: &Found| found.positions.join(" ");
         match &self.scheme {
             Some(s) => writeln!(
                 f,
@@ -83,22 +82,7 @@ impl fmt::Display for Nearest {
             None => writeln!(f, "positions: no scheme of up to {} was found that meets all", self.most)?,
         }
         for (name, found) in &self.candidates {
-            match found {
-                Some(found) if found.requirements.all_met() => {
-                    writeln!(
-                        f,
-                        "candidates: with --candidates {name} this scheme meets all: {} ({})",
-                        route(found),
-                        margin(found)
-                    )?;
-                }
-                Some(found) => writeln!(
-                    f,
-                    "candidates: with --candidates {name} the best found does not meet all: {}",
-                    margin(found)
-                )?,
-                None => writeln!(f, "candidates: with --candidates {name} none was found")?,
-            }
+            write_candidates(f, name, found.as_ref())?;
         }
         let ended = if self.unfinished { "; not all was tried" } else { "" };
         write!(
@@ -107,5 +91,28 @@ impl fmt::Display for Nearest {
              fewer positions that do",
             self.examined
         )
+    }
+}
+
+/// Positions of a scheme in order.
+fn route(of: &Found) -> String {
+    of.positions.join(" ")
+}
+
+/// Writes the line of other candidates that were tried, with their best scheme.
+fn write_candidates(f: &mut fmt::Formatter<'_>, name: &str, found: Option<&Found>) -> fmt::Result {
+    match found {
+        Some(found) if found.requirements.all_met() => writeln!(
+            f,
+            "candidates: with --candidates {name} this scheme meets all: {} ({})",
+            route(found),
+            margin(found)
+        ),
+        Some(found) => writeln!(
+            f,
+            "candidates: with --candidates {name} the best found does not meet all: {}",
+            margin(found)
+        ),
+        None => writeln!(f, "candidates: with --candidates {name} none was found"),
     }
 }

@@ -69,6 +69,35 @@ pub fn next(
     let by_candidate = if options.added == 1 { by_candidate(&found) } else { Vec::new() };
     found.truncate(options.keep.max(1));
     let found = found.into_iter().map(|e| extension(e, before.as_ref(), &required)).collect();
+    Ok(NextPositions {
+        schedule,
+        found,
+        by_candidate,
+        degrees_before: match (&before, &options.beforehand) {
+            (Some(before), None) => before.degrees.clone(),
+            _ => Vec::new(),
+        },
+        before: before.map(|b| b.standing),
+        as_good,
+        bound,
+        meets,
+        examined,
+        proven: !interrupted,
+        interrupted,
+        error_bound,
+        beyond_gimbals: beyond,
+        ..before_search(&compared, base, stated)?
+    })
+}
+
+/// Answer without extensions: the scheme, candidates and conditions. `stated` are the conditions with all
+/// requirements.
+fn before_search(
+    compared: &Compared<'_>,
+    base: &Scheme,
+    stated: &Conditions,
+) -> Result<NextPositions, DesignError> {
+    let Compared { start, conditions, candidates, required, options } = *compared;
     let of_conditions = Scheme { positions: any_position(), ..start.clone() };
     let names = Platform::new(Scheme { combinations: Vec::new(), ..of_conditions.clone() })?.names().to_vec();
     let walks = if options.days.is_empty() { Default::default() } else { base.ageing.clone() };
@@ -86,27 +115,24 @@ pub fn next(
         days: options.days.last().copied(),
         unused_ageing: unused.into_keys().collect(),
         ageing,
-        schedule,
+        schedule: Vec::new(),
         candidates: candidates.names.clone(),
-        beyond_gimbals: beyond,
+        beyond_gimbals: Vec::new(),
         added: options.added,
-        required: required.clone(),
+        required: required.to_vec(),
         conditions: MeasurementReport::new(&of_conditions, conditions),
-        found,
-        by_candidate,
-        degrees_before: match (&before, &options.beforehand) {
-            (Some(before), None) => before.degrees.clone(),
-            _ => Vec::new(),
-        },
-        before: before.map(|b| b.standing),
-        as_good,
-        bound,
-        meets,
-        examined,
-        proven: !interrupted,
-        interrupted,
+        found: Vec::new(),
+        by_candidate: Vec::new(),
+        degrees_before: Vec::new(),
+        before: None,
+        as_good: 0,
+        bound: None,
+        meets: None,
+        examined: 0,
+        proven: false,
+        interrupted: false,
         not_judged: not_judged(stated, conditions),
-        error_bound,
+        error_bound: 0.0,
         seed: options.seed,
     })
 }

@@ -37,14 +37,8 @@ pub(super) fn progress(
     let names: Vec<String> = own.names()[psi..].to_vec();
     let required = required_sigmas(own, conditions)?;
     let required = |c: usize| required[psi + c];
-    let sigma =
-        |of: &Attained, name: &String| of.totals[of.plan.platform.names().iter().position(|n| n == name)?];
     let sigmas: Vec<Vec<Option<f64>>> =
-        judged.iter().map(|a| names.iter().map(|name| sigma(a, name)).collect()).collect();
-    let is_determined = |name: &String, of: &Attained| {
-        let own = of.plan.platform.names().iter().position(|n| n == name);
-        own.is_some_and(|c| of.prediction.unknowns[c].determined_at_end)
-    };
+        judged.iter().map(|a| names.iter().map(|name| uncertainty(a, name)).collect()).collect();
     let position = |k: usize| scheme.positions[first + k - 1].name.clone();
     // from the last position back to the first one before which the condition fails
     let from = |holds: &dyn Fn(usize) -> bool| {
@@ -84,6 +78,21 @@ pub(super) fn progress(
     });
     let after = after.collect();
     Ok(Progress { after, coefficients, requirements })
+}
+
+/// Index of an unknown; `None` if it is none of the scheme.
+fn index(of: &Attained, name: &str) -> Option<usize> {
+    of.plan.platform.names().iter().position(|n| n == name)
+}
+
+/// Total uncertainty of an unknown at the end; `None` if it is not determined.
+fn uncertainty(of: &Attained, name: &str) -> Option<f64> {
+    of.totals[index(of, name)?]
+}
+
+/// True if samples determine an unknown at the end.
+fn is_determined(name: &str, of: &Attained) -> bool {
+    index(of, name).is_some_and(|c| of.prediction.unknowns[c].determined_at_end)
 }
 
 /// Accuracy of the first `count` positions.

@@ -38,7 +38,7 @@ pub use ranks::{Ordered, Ranks, Set};
 use search::{CheapestSet, Goal, SetSearch, StopReason};
 use unique::{UniqueSolutions, is_one};
 
-use crate::degree_caps::widest_first;
+use crate::degree_caps::{DegreeCap, widest_first};
 
 /// Largest number of candidates.
 pub const MAX_SENSORS: usize = 64;
@@ -443,6 +443,25 @@ impl SensorTask<'_> {
         out
     }
 
+    /// Sets with their degrees, as they are listed.
+    fn listed(&mut self, sets: &[Set]) -> Result<Vec<SensorSet>, SensorError> {
+        let mut listed = Vec::new();
+        for &set in sets {
+            let worst = self.search.worst(set).map_err(|_| SensorError::Interrupted)?;
+            listed.push(self.set(set, worst));
+        }
+        Ok(listed)
+    }
+
+    /// Largest degrees asked for, as a user writes them.
+    fn caps_in_words(&self) -> Vec<String> {
+        let word = |(name, k): &DegreeCap| match name {
+            Some(name) => format!("{name}={k}"),
+            None => k.to_string(),
+        };
+        self.options.max_degree.iter().map(word).collect()
+    }
+
     fn answer(&mut self) -> Result<Sensors, SensorError> {
         let unattainable = self.require()?;
         let candidates = self.candidates();
@@ -462,11 +481,7 @@ impl SensorTask<'_> {
         let all = self.options.candidates.len() as u32;
         let (found, complete_to) = (sets.len(), (complete < all).then_some(complete as usize));
         sets.truncate(self.options.keep);
-        let mut listed = Vec::new();
-        for &set in &sets {
-            let worst = self.search.worst(set).map_err(|_| SensorError::Interrupted)?;
-            listed.push(self.set(set, worst));
-        }
+        let listed = self.listed(&sets)?;
         let least = self.search.worst(self.search.all).ok().filter(|_| any);
         let relied = front.iter().map(|f| f.0).chain(sets).chain(self.proofs(&front));
         let confirmed = Confirmation::of(self, relied.collect())?;
@@ -480,15 +495,7 @@ impl SensorTask<'_> {
             },
             candidates,
             required: self.required.iter().map(|&u| self.asked[u].name.clone()).collect(),
-            max_degree: self
-                .options
-                .max_degree
-                .iter()
-                .map(|(name, k)| match name {
-                    Some(name) => format!("{name}={k}"),
-                    None => k.to_string(),
-                })
-                .collect(),
+            max_degree: self.caps_in_words(),
             unattainable,
             one_solution: self
                 .search

@@ -19,6 +19,10 @@ const INCONSISTENT: &str = "Do not use the filter's sigmas: its run is inconsist
 /// Advice if checks of the filter fail.
 const FAILING: &str = "First explain the filter checks that fail (section Evidence by a filter).";
 
+/// Advice for a calibration whose iteration did not settle.
+const UNSETTLED: &str = "Look at units, labels and times of the record, and state first estimates near the truth \
+                         in the scheme file.";
+
 /// Actions for a scheme, the gravest first.
 pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme) -> Vec<String> {
     let missed = |why: Miss| -> Vec<&str> {
@@ -348,22 +352,12 @@ fn at_positions(c: &Calibration) -> String {
 fn of_finding(c: &Calibration, f: &Finding) -> String {
     match f {
         Finding::Interrupted => "Run the same command again, to its end.".into(),
-        Finding::NotSettled => {
-            "Look at units, labels and times of the record, and state first estimates near the truth \
-             in the scheme file."
-                .into()
-        }
+        Finding::NotSettled => UNSETTLED.into(),
         Finding::Clock { by_durations, by_durations_sigma, by_changes, by_earth, .. } => {
             let by_durations = durations(*by_durations, *by_durations_sigma);
             of_clock(by_durations.as_ref(), by_changes.as_ref(), by_earth.as_ref()).into()
         }
-        Finding::Cells { column, kind_of_cells: CellKind::Code, .. } => format!(
-            "Look at column {column} of the record: state its codes of missing values in the scheme file."
-        ),
-        Finding::Cells { column, kind_of_cells: CellKind::Stuck, lines, .. } => format!(
-            "Look at column {column} of the record between lines {} and {}: empty the cells of a stuck output.",
-            lines.0, lines.1
-        ),
+        Finding::Cells { column, kind_of_cells, lines, .. } => of_cells(column, *kind_of_cells, *lines),
         Finding::Succession { position, .. } => format!(
             "Look at the record around these lines: after a step of an output, run {position} again; where \
              the platform was disturbed, empty the cells of those rows."
@@ -411,6 +405,19 @@ fn of_finding(c: &Calibration, f: &Finding) -> String {
         Finding::Known { .. } => {
             "Calibrate without the earlier calibration: it does not agree with these records.".into()
         }
+    }
+}
+
+/// Action for cells of a column that hold one value again and again.
+fn of_cells(column: &str, kind: CellKind, (first, last): (u64, u64)) -> String {
+    match kind {
+        CellKind::Code => format!(
+            "Look at column {column} of the record: state its codes of missing values in the scheme file."
+        ),
+        CellKind::Stuck => format!(
+            "Look at column {column} of the record between lines {first} and {last}: empty the cells of a stuck \
+             output."
+        ),
     }
 }
 

@@ -94,17 +94,7 @@ impl Evaluator {
             problem = here.additive(problem.objective.clone(), k);
             found = weigh(&problem, going)?;
         }
-        // h: changes of three angles, of which two axes may coincide, are a rotation by at most sqrt(5)
-        // times the largest change
-        let h = 5f64.sqrt() * (FINE as f64 / 2.0).to_radians();
-        let n = self.degree();
-        let g = self.information_of_effects();
-        let energy = |e: &Euler| self.energy_bounded(e, &g, &found.dual.x) * scale;
-        let largest = |points: Points<'_>| points.map(|p| p.1).fold(0.0, f64::max);
-        let on_net = on_net(FINE, n, &|e| energy(e).value, largest).into_iter().fold(0.0, f64::max);
-        let (hidden, moved) = hidden(FINE, n, &energy);
-        let part = (1.0 + (n as f64 * h).cos()) / 2.0 * (1.0 - rounding(0));
-        let most = (on_net + hidden) / (part - moved) * (1.0 + rounding(0));
+        let most = self.largest_energy(&found.dual.x, scale);
         let known = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
         let most = most.max(known);
         let value = problem.lower_bound_over(&found.dual, most).sqrt();
@@ -118,6 +108,21 @@ impl Evaluator {
         let support = support.into_iter().zip(weights).filter(|(_, w)| *w > 0.0).collect();
         let attained = attained.sqrt().max(value);
         going().then_some(Everywhere { value, attained, support })
+    }
+
+    /// Upper bound on the contribution of one position at any attitude, X in units of deg/h, times `scale`.
+    fn largest_energy(&self, x: &DMatrix<f64>, scale: f64) -> f64 {
+        // h: changes of three angles, of which two axes may coincide, are a rotation by at most sqrt(5)
+        // times the largest change
+        let h = 5f64.sqrt() * (FINE as f64 / 2.0).to_radians();
+        let n = self.degree();
+        let g = self.information_of_effects();
+        let energy = |e: &Euler| self.energy_bounded(e, &g, x) * scale;
+        let largest = |points: Points<'_>| points.map(|p| p.1).fold(0.0, f64::max);
+        let on_net = on_net(FINE, n, &|e| energy(e).value, largest).into_iter().fold(0.0, f64::max);
+        let (hidden, moved) = hidden(FINE, n, &energy);
+        let part = (1.0 + (n as f64 * h).cos()) / 2.0 * (1.0 - rounding(0));
+        (on_net + hidden) / (part - moved) * (1.0 + rounding(0))
     }
 
     /// Contribution `d(C)` of one position, X in units of deg/h.

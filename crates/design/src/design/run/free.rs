@@ -88,34 +88,46 @@ impl Free {
         }
         let every = prepared.evaluator.everywhere(&prepared.task.criterion, k, &going);
         let every = every.ok_or(DesignError::Interrupted)?;
-        let (mut candidates, _) = Candidates::cardinals().within(&base.gimbals);
-        let mut out = Self {
-            every,
-            candidates: candidates.clone(),
-            starts: Vec::new(),
-            examined: 0,
-            cardinal: None,
-            finer: None,
-        };
-        if !candidates.attitudes.is_empty() {
+        let (candidates, _) = Candidates::cardinals().within(&base.gimbals);
+        let mut out =
+            Self { every, candidates, starts: Vec::new(), examined: 0, cardinal: None, finer: None };
+        if !out.candidates.attitudes.is_empty() {
             out.begin_with_cardinals(base, conditions, options, k, progress)?;
         }
-        let mut support: Vec<&(Euler, f64)> = out.every.support.iter().collect();
+        out.add_support(step);
+        out.add_moved(base, conditions, options, (k, step), progress)?;
+        Ok(out)
+    }
+
+    /// Adds the heaviest attitudes of the support, rounded to multiples of `step` 1e-9 degrees.
+    fn add_support(&mut self, step: i64) {
+        let mut support: Vec<&(Euler, f64)> = self.every.support.iter().collect();
         support.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (euler, _) in support.into_iter().take(WEIGHED) {
-            candidates.add(euler.each_ref().map(|angle| rounded(angle, step)));
+            self.candidates.add(euler.each_ref().map(|angle| rounded(angle, step)));
         }
-        out.candidates = candidates;
-        // schemes of these candidates, by exchange
-        let chosen = DesignOptions { candidates: out.candidates.clone(), ..options.clone() };
+    }
+
+    /// Adds the best schemes of these candidates, by exchange, and the attitudes of schemes that are moved on
+    /// the grid of `step` 1e-9 degrees.
+    fn add_moved(
+        &mut self,
+        base: &Scheme,
+        conditions: &Conditions,
+        options: &DesignOptions,
+        (k, step): (usize, i64),
+        progress: &(dyn Fn(Progress) -> bool + Sync),
+    ) -> Result<(), DesignError> {
+        let going = || progress(NOTHING_YET);
+        let chosen = DesignOptions { candidates: self.candidates.clone(), ..options.clone() };
         let prepared = Prepared::new(base, conditions, &chosen, &going)?;
         let task = &prepared.task;
         let search = Search { keep: options.restarts as usize, ..prepared.search(progress) };
-        let best = search.exchange(k, &task.sequences_of(&out.starts), options.restarts, options.seed);
-        out.examined += best.examined;
+        let best = search.exchange(k, &task.sequences_of(&self.starts), options.restarts, options.seed);
+        self.examined += best.examined;
         let exchanged = unlike(&best.found);
         let attitudes = |scored: &Scored| task.placed(scored).0;
-        out.starts.extend(exchanged.iter().take(options.keep.max(MOVED)).map(|s| attitudes(s)));
+        self.starts.extend(exchanged.iter().take(options.keep.max(MOVED)).map(|s| attitudes(s)));
         let mut rng = SplitMix64::new(options.seed ^ 0x726f_756e_6465_6421);
         let random = (0..RANDOM).filter_map(|_| random(k, step, &base.gimbals, &mut rng));
         let first: Vec<Vec<Euler>> =
@@ -128,15 +140,15 @@ impl Free {
             going: &going,
         };
         let mut moved: Vec<OnGrids> = parallel::map(first.len(), |i| moves.rounded(&first[i], step));
-        out.examined += moved.iter().map(|m| m.finer.examined + m.on_step.examined).sum::<u64>();
+        self.examined += moved.iter().map(|m| m.finer.examined + m.on_step.examined).sum::<u64>();
         let finer = moved.iter().map(|m| &m.finer).min_by(|a, b| a.order(b));
-        out.finer = finer.filter(|f| f.violation == 0.0 && f.value.is_finite()).cloned();
+        self.finer = finer.filter(|f| f.violation == 0.0 && f.value.is_finite()).cloned();
         moved.sort_by(|a, b| a.on_step.order(&b.on_step));
         for OnGrids { on_step: MovedScheme { scheme, .. }, .. } in moved.into_iter().take(CHOSEN) {
-            scheme.iter().for_each(|euler| out.candidates.add(euler.clone()));
-            out.starts.push(scheme);
+            scheme.iter().for_each(|euler| self.candidates.add(euler.clone()));
+            self.starts.push(scheme);
         }
-        Ok(out)
+        Ok(())
     }
 
     /// Finds the best schemes of the cardinal attitudes by exchange, and a lower bound on all of these.

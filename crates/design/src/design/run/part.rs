@@ -8,6 +8,7 @@ use obsdeg_evidence::simulation::Conditions;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::design::measure::stop::Stop;
 use crate::design::request::error::{DesignError, PartError};
 use crate::design::request::options::DesignOptions;
 use crate::design::run::inputs::{Inputs, differing, sha256};
@@ -15,6 +16,7 @@ use crate::design::run::prepared::Prepared;
 use crate::design::run::task::asked;
 use crate::design::search::best::Best;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
+use crate::design::search::scoring::Search;
 
 /// Name and version of the JSON layout.
 pub const PART_SCHEMA: &str = "obsdeg.part/2";
@@ -86,6 +88,61 @@ impl Block {
 }
 
 impl Part {
+    /// Part before its search.
+    fn begun(inputs: Inputs, part: [usize; 2], starts: [usize; 3]) -> Self {
+        Self {
+            schema: PART_SCHEMA.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            digest: inputs.digest,
+            inputs: inputs.written,
+            asked: None,
+            part,
+            starts,
+            levels: Vec::new(),
+            complete: false,
+            seal: String::new(),
+        }
+    }
+
+    /// Searches the starts of the part that are left, of `starts`, level by level; false if interrupted.
+    fn searched(
+        &mut self,
+        prepared: &Prepared<'_>,
+        search: &Search<'_>,
+        k: usize,
+        starts: &[Vec<Stop>],
+    ) -> bool {
+        let keep = prepared.task.options.keep;
+        let [first, end, _] = self.starts;
+        let pruning = prepared.pruning(search, k);
+        let Some(levels) = search.levels_of(k) else { return false };
+        let mut all = Best { complete: true, ..Best::default() };
+        for (i, level) in levels.iter().enumerate() {
+            if self.levels.len() == i {
+                let best = Best { complete: true, ..Best::default() };
+                self.levels.push(Level { next: first, best, blocks: Vec::new() });
+            }
+            let here = &mut self.levels[i];
+            while here.next < end {
+                let block = here.next..(here.next + BLOCK).min(end);
+                let symmetry = &prepared.task.symmetry;
+                let done =
+                    search.exhaust_starts(&starts[block.clone()], symmetry, k, level, pruning.as_ref());
+                if !done.complete {
+                    return false;
+                }
+                here.blocks.push(Block::new(&block, &done));
+                here.best.merge(keep, done);
+                here.next = block.end;
+            }
+            all.merge(keep, here.best.clone());
+            if all.found.len() >= keep.max(1) {
+                break;
+            }
+        }
+        true
+    }
+
     /// Same part with the digest of its contents.
     #[must_use]
     pub fn sealed(mut self) -> Self {
@@ -193,49 +250,12 @@ pub fn design_part(
         let starts = search.starts(&prepared.task.symmetry, k);
         let own = range(&search.work(&starts, k), part);
         let expected = [own.start, own.end, starts.len()];
-        let mut out = resumed.unwrap_or_else(|| Part {
-            schema: PART_SCHEMA.into(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            digest: inputs.digest,
-            inputs: inputs.written,
-            asked: None,
-            part,
-            starts: expected,
-            levels: Vec::new(),
-            complete: false,
-            seal: String::new(),
-        });
+        let mut out = resumed.unwrap_or_else(|| Part::begun(inputs, part, expected));
         if out.starts != expected {
             let why = PartError::Starts { found: out.starts, expected, part };
             return Err(DesignError::Part { name: "the part to go on with".into(), why });
         }
-        let pruning = prepared.pruning(&search, k);
-        let Some(levels) = search.levels_of(k) else { return Ok(out.sealed()) };
-        let mut all = Best { complete: true, ..Best::default() };
-        for (i, level) in levels.iter().enumerate() {
-            if out.levels.len() == i {
-                let best = Best { complete: true, ..Best::default() };
-                out.levels.push(Level { next: own.start, best, blocks: Vec::new() });
-            }
-            let here = &mut out.levels[i];
-            while here.next < own.end {
-                let block = here.next..(here.next + BLOCK).min(own.end);
-                let symmetry = &prepared.task.symmetry;
-                let done =
-                    search.exhaust_starts(&starts[block.clone()], symmetry, k, level, pruning.as_ref());
-                if !done.complete {
-                    return Ok(out.sealed());
-                }
-                here.blocks.push(Block::new(&block, &done));
-                here.best.merge(options.keep, done);
-                here.next = block.end;
-            }
-            all.merge(options.keep, here.best.clone());
-            if all.found.len() >= options.keep.max(1) {
-                break;
-            }
-        }
-        out.complete = true;
+        out.complete = out.searched(&prepared, &search, k, &starts);
         Ok(out.sealed())
     })
 }
