@@ -207,18 +207,7 @@ fn rows<R: LiftField>(
             continue;
         }
         psi = match (&left, carry) {
-            (Some(_), Carry::Inertial) => point.turns_to(i).iter().fold(psi, |psi, (from, turn)| {
-                let jump = product(&point.ring, from, &turn.integral(&point.ring));
-                let columns = platform.errors().torquer_columns(&point.ring, &turn.axis);
-                std::array::from_fn(|r| {
-                    let more =
-                        |c: usize| point.ring.dot(0, (0..3).map(|j| (jump[r][j], columns[j][c - first])));
-                    let add = |(c, x): (usize, &R::Element)| {
-                        if c < first { x.clone() } else { ring.add(x, &ring.lift(more(c))) }
-                    };
-                    psi[r].iter().enumerate().map(add).collect()
-                })
-            }),
+            (Some(_), Carry::Inertial) => jumped(platform, sample, ring, i, psi),
             (Some(before), Carry::Platform) => times(ring, &lift(c), before),
             _ => {
                 let own = if carry == Carry::Reset { 3 * station.index } else { 0 };
@@ -243,6 +232,29 @@ fn rows<R: LiftField>(
         left = Some(times(ring, &lift(&transpose(&point.attitudes[i + 1])), &psi));
     }
     out
+}
+
+/// `psi^n` after the turns to a station, with the torquer errors of these.
+fn jumped<R: LiftField>(
+    platform: &Platform,
+    sample: &Sample,
+    ring: &R,
+    station: usize,
+    psi: Columns<R::Element>,
+) -> Columns<R::Element> {
+    let point = &sample.point;
+    let first = platform.names().len() - platform.coefficients();
+    point.turns_to(station).iter().fold(psi, |psi, (from, turn)| {
+        let jump = product(&point.ring, from, &turn.integral(&point.ring));
+        let columns = platform.errors().torquer_columns(&point.ring, &turn.axis);
+        std::array::from_fn(|r| {
+            let more = |c: usize| point.ring.dot(0, (0..3).map(|j| (jump[r][j], columns[j][c - first])));
+            let add = |(c, x): (usize, &R::Element)| {
+                if c < first { x.clone() } else { ring.add(x, &ring.lift(more(c))) }
+            };
+            psi[r].iter().enumerate().map(add).collect()
+        })
+    })
 }
 
 /// A functional of the local unknowns at a position, as a functional of the unknowns of the scheme.

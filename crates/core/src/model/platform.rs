@@ -146,14 +146,9 @@ impl Platform {
     pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
         let ring = &point.ring;
         if self.scheme.unknowns == Unknowns::Drift {
-            let rows = std::array::from_fn(|i| match i {
-                0..PSI_EPS => (0..PSI_EPS).map(|j| if i == j { ring.one() } else { ring.zero() }).collect(),
-                _ => Box::default(),
-            });
-            return vec![Block { columns: (0..PSI_EPS).collect(), rows }];
+            return vec![drift_block(ring)];
         }
         let first_d = self.names.len() - self.coefficients();
-        let accelerometers = self.observed().accelerometers;
         // psi^n as a function of psi at the start of the scheme, and psi in platform axes at the end of a
         // rotation
         let mut psi_block = &point.attitudes[0];
@@ -161,13 +156,7 @@ impl Platform {
         let mut handed_on: Option<Matrix3<R::Element>> = None;
         // sum of torquer errors in psi^n
         let mut torqued: Option<Columns<R::Element>> = None;
-        let (no_psi, nothing) = ([0; 3].map(|_| ring.zero()), vec![ring.zero(); self.coefficients()]);
-        let row = |psi: &[R::Element; 3], rest: &[R::Element]| {
-            let mut row = Vec::with_capacity(3 + rest.len());
-            row.extend_from_slice(psi);
-            row.extend_from_slice(rest);
-            row.into_boxed_slice()
-        };
+        let nothing = vec![ring.zero(); self.coefficients()];
         let stations = self.scheme.stations();
         let mut out = Vec::with_capacity(stations.len());
         for (i, (station, c)) in stations.iter().zip(&point.attitudes).enumerate() {
@@ -185,34 +174,78 @@ impl Platform {
                     std::array::from_fn(|r| std::array::from_fn(|k| c[k][r].clone()));
                 handed_on = Some(product(ring, &back, psi_block));
             }
-            for (from, turn) in point.turns_to(i) {
-                let left = times(
-                    ring,
-                    &product(ring, &from, &turn.integral(ring)),
-                    &self.errors.torquer_columns(ring, &turn.axis),
-                );
-                torqued = Some(match torqued {
-                    None => left,
-                    Some(old) => std::array::from_fn(|r| {
-                        old[r].iter().zip(&left[r]).map(|(a, b)| ring.add(a, b)).collect()
-                    }),
-                });
-            }
+            torqued = self.with_torquer_errors(point, i, torqued);
+            let torquers =
+                std::array::from_fn(|r| torqued.as_ref().map_or(&nothing, |left| &left[r]).as_slice());
             let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
-            let drift = self.errors.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
-            let accelerometer =
-                if accelerometers { self.errors.accelerometer_rows(ring, c) } else { Default::default() };
-            let rows = std::array::from_fn(|r| match r {
-                0..3 => row(&psi_block[r], torqued.as_ref().map_or(&nothing, |left| &left[r])),
-                3..PSI_EPS => row(&no_psi, &drift[r - 3]),
-                _ if !accelerometers => Box::default(),
-                _ => row(&no_psi, &accelerometer[r - PSI_EPS]),
-            });
             let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
-            out.push(Block { columns, rows });
+            out.push(Block { columns, rows: self.rows_at(point, c, psi_block, torquers) });
         }
         out
     }
+
+    /// Sum of the torquer errors in psi^n, with those of the turns to a station.
+    fn with_torquer_errors<R: Ring>(
+        &self,
+        point: &Point<R>,
+        station: usize,
+        before: Option<Columns<R::Element>>,
+    ) -> Option<Columns<R::Element>> {
+        let ring = &point.ring;
+        let mut torqued = before;
+        for (from, turn) in point.turns_to(station) {
+            let left = times(
+                ring,
+                &product(ring, &from, &turn.integral(ring)),
+                &self.errors.torquer_columns(ring, &turn.axis),
+            );
+            torqued = Some(match torqued {
+                None => left,
+                Some(old) => std::array::from_fn(|r| {
+                    old[r].iter().zip(&left[r]).map(|(a, b)| ring.add(a, b)).collect()
+                }),
+            });
+        }
+        torqued
+    }
+
+    /// Rows of the local unknowns at an attitude: psi^n by psi and by the errors of torquers, then the errors
+    /// of gyros and accelerometers.
+    fn rows_at<R: Ring>(
+        &self,
+        point: &Point<R>,
+        c: &Matrix3<R::Element>,
+        psi: &Matrix3<R::Element>,
+        torquers: [&[R::Element]; 3],
+    ) -> [Box<[R::Element]>; LOCAL] {
+        let ring = &point.ring;
+        let accelerometers = self.observed().accelerometers;
+        let no_psi = [0; 3].map(|_| ring.zero());
+        let row = |psi: &[R::Element; 3], rest: &[R::Element]| {
+            let mut row = Vec::with_capacity(3 + rest.len());
+            row.extend_from_slice(psi);
+            row.extend_from_slice(rest);
+            row.into_boxed_slice()
+        };
+        let drift = self.errors.drift_rows(ring, c, || earth_rate_in(ring, c, &point.w_n, &point.w_u));
+        let accelerometer =
+            if accelerometers { self.errors.accelerometer_rows(ring, c) } else { Default::default() };
+        std::array::from_fn(|r| match r {
+            0..3 => row(&psi[r], torquers[r]),
+            3..PSI_EPS => row(&no_psi, &drift[r - 3]),
+            _ if !accelerometers => Box::default(),
+            _ => row(&no_psi, &accelerometer[r - PSI_EPS]),
+        })
+    }
+}
+
+/// Block of a scheme whose unknowns are psi and eps themselves.
+fn drift_block<R: Ring>(ring: &R) -> Block<R::Element> {
+    let rows = std::array::from_fn(|i| match i {
+        0..PSI_EPS => (0..PSI_EPS).map(|j| if i == j { ring.one() } else { ring.zero() }).collect(),
+        _ => Box::default(),
+    });
+    Block { columns: (0..PSI_EPS).collect(), rows }
 }
 
 impl<R: Ring> Point<R> {

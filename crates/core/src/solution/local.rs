@@ -176,21 +176,23 @@ mod tests {
     use crate::model::platform::{local_dynamics, local_output};
     use obsdeg_exact::{Echelon, Field, SplitMix64};
 
+    /// True for a pole, for the equator, and with a measured azimuth.
+    const PLACES: [(bool, bool, bool); 5] = [
+        (false, false, false),
+        (true, false, false),
+        (false, true, false),
+        (false, false, true),
+        (true, false, true),
+    ];
+
     /// (13)-(17) agree with the recursion: substituting the derivatives of Z gives the functional, and at
     /// every order the observables span the same space as the recursion.
     #[test]
     fn observables_of_one_position_follow_from_the_recursion() {
         let f = Field::new((1 << 60) + 33);
         let mut rng = SplitMix64::new(4);
-        let places = [
-            (false, false, false),
-            (true, false, false),
-            (false, true, false),
-            (false, false, true),
-            (true, false, true),
-        ];
         for ((pole, equator, azimuth), accelerometers) in
-            places.iter().flat_map(|p| [(*p, false), (*p, true)])
+            PLACES.iter().flat_map(|p| [(*p, false), (*p, true)])
         {
             let mut rate = |zero: bool| if zero { 0 } else { f.from_u64(rng.next_u64()) };
             let (w_n, w_u) = (rate(pole), rate(equator));

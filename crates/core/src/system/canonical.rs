@@ -16,62 +16,11 @@ impl SystemModel {
     /// came from.
     fn canonical(&self) -> Vec<String> {
         let mut out: Vec<String> = vec!["model".into()];
-        let text = |f: &PlacedExpression| f.text.trim().to_string();
-        let count = |out: &mut Vec<String>, n: usize| out.push(n.to_string());
-        count(&mut out, self.states.len());
-        for s in &self.states {
-            let start = match &s.start {
-                StateStart::Unknown => "unknown".into(),
-                StateStart::Known => "known".into(),
-                StateStart::Value(f) => format!("={}", text(f)),
-            };
-            out.extend([s.named.name.clone(), text(&s.equation), start]);
-        }
-        count(&mut out, self.parameters.len());
-        out.extend(self.parameters.iter().map(|p| p.name.clone()));
-        let kind_of = |input: &KnownInput| match input {
-            KnownInput::Generic => "generic".into(),
-            KnownInput::Polynomial(degree) => format!("polynomial {degree}"),
-            KnownInput::Function(f) => format!("={}", text(f)),
-        };
-        count(&mut out, self.known_inputs.len());
-        for (named, input) in &self.known_inputs {
-            out.extend([named.name.clone(), kind_of(input)]);
-        }
-        count(&mut out, self.unknown_inputs.len());
-        for (named, degree) in &self.unknown_inputs {
-            let kind = degree.map_or_else(|| "arbitrary".into(), |d| format!("polynomial {d}"));
-            out.extend([named.name.clone(), kind]);
-        }
-        count(&mut out, self.constants.len());
-        for (named, constant) in &self.constants {
-            let value = match constant {
-                Constant::Generic => "generic".into(),
-                Constant::Value(f) => format!("={}", text(f)),
-            };
-            out.extend([named.name.clone(), value]);
-        }
-        let formulas = |out: &mut Vec<String>,
-                        list: &mut dyn Iterator<Item = (&String, &PlacedExpression)>| {
-            let pairs: Vec<[String; 2]> = list.map(|(name, f)| [name.clone(), text(f)]).collect();
-            out.push(pairs.len().to_string());
-            out.extend(pairs.into_iter().flatten());
-        };
-        formulas(&mut out, &mut self.definitions.iter().map(|(name, f)| (name, f)));
-        formulas(&mut out, &mut self.outputs.iter().map(|(named, f)| (&named.name, f)));
+        self.list_quantities(&mut out);
+        list_formulas(&mut out, self.definitions.iter().map(|(name, f)| (name, f)));
+        list_formulas(&mut out, self.outputs.iter().map(|(named, f)| (&named.name, f)));
         count(&mut out, self.experiments);
-        count(&mut out, self.segments.len());
-        for s in &self.segments {
-            formulas(&mut out, &mut s.constants.iter().map(|(name, f)| (name, f)));
-            formulas(&mut out, &mut s.carry.iter().map(|(name, f)| (name, f)));
-        }
-        out.extend(self.combinations.iter().map(text));
-        for own in &self.own {
-            out.push("experiment".into());
-            formulas(&mut out, &mut own.constants.iter().map(|(name, f)| (name, f)));
-            count(&mut out, own.known_inputs.len());
-            out.extend(own.known_inputs.iter().flat_map(|(name, input)| [name.clone(), kind_of(input)]));
-        }
+        self.list_changes(&mut out);
         match self.time {
             StartTime::Zero => {}
             StartTime::At { mantissa, decimals } => {
@@ -86,4 +35,77 @@ impl SystemModel {
         }
         out
     }
+
+    /// States, parameters, inputs and constants.
+    fn list_quantities(&self, out: &mut Vec<String>) {
+        count(out, self.states.len());
+        for s in &self.states {
+            let start = match &s.start {
+                StateStart::Unknown => "unknown".into(),
+                StateStart::Known => "known".into(),
+                StateStart::Value(f) => format!("={}", text(f)),
+            };
+            out.extend([s.named.name.clone(), text(&s.equation), start]);
+        }
+        count(out, self.parameters.len());
+        out.extend(self.parameters.iter().map(|p| p.name.clone()));
+        count(out, self.known_inputs.len());
+        for (named, input) in &self.known_inputs {
+            out.extend([named.name.clone(), kind_of(input)]);
+        }
+        count(out, self.unknown_inputs.len());
+        for (named, degree) in &self.unknown_inputs {
+            let kind = degree.map_or_else(|| "arbitrary".into(), |d| format!("polynomial {d}"));
+            out.extend([named.name.clone(), kind]);
+        }
+        count(out, self.constants.len());
+        for (named, constant) in &self.constants {
+            let value = match constant {
+                Constant::Generic => "generic".into(),
+                Constant::Value(f) => format!("={}", text(f)),
+            };
+            out.extend([named.name.clone(), value]);
+        }
+    }
+
+    /// Segments, combinations, and the differences of the experiments.
+    fn list_changes(&self, out: &mut Vec<String>) {
+        count(out, self.segments.len());
+        for s in &self.segments {
+            list_formulas(out, s.constants.iter().map(|(name, f)| (name, f)));
+            list_formulas(out, s.carry.iter().map(|(name, f)| (name, f)));
+        }
+        out.extend(self.combinations.iter().map(text));
+        for own in &self.own {
+            out.push("experiment".into());
+            list_formulas(out, own.constants.iter().map(|(name, f)| (name, f)));
+            count(out, own.known_inputs.len());
+            out.extend(own.known_inputs.iter().flat_map(|(name, input)| [name.clone(), kind_of(input)]));
+        }
+    }
+}
+
+fn text(f: &PlacedExpression) -> String {
+    f.text.trim().to_string()
+}
+
+fn count(out: &mut Vec<String>, n: usize) {
+    out.push(n.to_string());
+}
+
+fn kind_of(input: &KnownInput) -> String {
+    match input {
+        KnownInput::Generic => "generic".into(),
+        KnownInput::Polynomial(degree) => format!("polynomial {degree}"),
+        KnownInput::Function(f) => format!("={}", text(f)),
+    }
+}
+
+/// Appends the number of formulas, then their names and texts.
+fn list_formulas<'a>(
+    out: &mut Vec<String>,
+    list: impl ExactSizeIterator<Item = (&'a String, &'a PlacedExpression)>,
+) {
+    count(out, list.len());
+    out.extend(list.flat_map(|(name, f)| [name.clone(), text(f)]));
 }

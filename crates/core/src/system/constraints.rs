@@ -241,41 +241,29 @@ fn solve(
         chosen.swap(i, j);
     }
     let chosen = chosen.get(..m)?;
-    let mut line = Echelon::new(*f, m + 1);
+    let mut linear = Echelon::new(*f, m + 1);
     let mut bent = None;
     for (k, g) in block.iter().enumerate() {
         let row = if m > 1 { g.linear(chosen, values, rng) } else { None };
         match row {
             // one constraint always remains for the end
             Some(row) if k + 1 < m || bent.is_some() => {
-                line.insert(&row);
+                linear.insert(&row);
             }
             _ if bent.is_some() => return None,
             _ => bent = Some(g),
         }
     }
     let bent = bent?;
-    let [first, second] = <[Vec<u64>; 2]>::try_from(line.null_space()).ok()?;
-    let (a, b) = (first[m], second[m]);
-    let weight = rng.below(f.modulus());
-    // a point of the line has 1 as its last entry, a direction has 0
-    let height = f.add(a, f.mul(weight, b));
-    if height == 0 {
-        return None;
-    }
-    let scale = f.inv(height);
-    let point = |k: usize| f.mul(f.add(first[k], f.mul(weight, second[k])), scale);
-    let direction = |k: usize| f.sub(f.mul(first[k], b), f.mul(second[k], a));
-    let mut at = |t: u64| {
-        for (k, &s) in chosen.iter().enumerate() {
-            values[s] = f.add(point(k), f.mul(t, direction(k)));
-        }
-        bent.at(values).0
-    };
+    let line = SolutionLine::of(f, &linear, m, rng)?;
     let degree = bent.degree(chosen).0;
     if degree > MAX_DEGREE {
         return None;
     }
+    let mut at = |t: u64| {
+        chosen.iter().enumerate().for_each(|(k, &s)| values[s] = line.at(f, k, t));
+        bent.at(values).0
+    };
     let points = degree as u64 + 1;
     take(points * bent.operations() + points * points * PER_SQUARE)?;
     let samples: Vec<(u64, u64)> = (0..=degree as u64).map(|t| f.from_u64(t)).map(|t| (t, at(t))).collect();
@@ -283,4 +271,34 @@ fn solve(
     let t = if polynomial.is_empty() { 0 } else { root(f, &polynomial, rng)? };
     at(t);
     Some(())
+}
+
+/// Line on which linear constraints hold: a point and a direction, by slot.
+struct SolutionLine {
+    point: Vec<u64>,
+    direction: Vec<u64>,
+}
+
+impl SolutionLine {
+    /// Solutions in m slots of equations whose last column is the constant term, from a random point of them;
+    /// `None` if they are no line.
+    fn of(f: &Field, linear: &Echelon, m: usize, rng: &mut SplitMix64) -> Option<Self> {
+        let [first, second] = <[Vec<u64>; 2]>::try_from(linear.null_space()).ok()?;
+        let (a, b) = (first[m], second[m]);
+        let weight = rng.below(f.modulus());
+        // a point of the line has 1 as its last entry, a direction has 0
+        let height = f.add(a, f.mul(weight, b));
+        if height == 0 {
+            return None;
+        }
+        let scale = f.inv(height);
+        let point = |k: usize| f.mul(f.add(first[k], f.mul(weight, second[k])), scale);
+        let direction = |k: usize| f.sub(f.mul(first[k], b), f.mul(second[k], a));
+        Some(Self { point: (0..m).map(point).collect(), direction: (0..m).map(direction).collect() })
+    }
+
+    /// Value of slot k at the parameter t.
+    fn at(&self, f: &Field, k: usize, t: u64) -> u64 {
+        f.add(self.point[k], f.mul(t, self.direction[k]))
+    }
 }

@@ -59,6 +59,30 @@ type Cost = (bool, bool, usize, usize);
 /// Equation that is linear in products of parameters: their coefficients.
 type Row = BTreeMap<Monomial, Fraction>;
 
+/// Subtracts the multiple of `row`, whose coefficient of `m` is one, that removes `m` from `other`. False if
+/// a coefficient is beyond the limits of its size.
+fn subtract_multiple(s: &mut Algebra, other: &mut Row, m: &Monomial, row: &Row) -> Result<bool, OverLimit> {
+    let Some(factor) = other.get(m).map(|c| s.minus(c)) else { return Ok(true) };
+    for (k, c) in row {
+        if factor.terms() * c.terms() > PRODUCT {
+            return Ok(false);
+        }
+        let mut sum = s.times(&factor, c)?;
+        if let Some(old) = other.get(k) {
+            sum = s.sum(old, &sum)?;
+        }
+        if sum.terms() > TERMS {
+            return Ok(false);
+        }
+        if sum.is_zero() {
+            other.remove(k);
+        } else {
+            other.insert(k.clone(), sum);
+        }
+    }
+    Ok(true)
+}
+
 /// Derivative of an output or of a known input.
 struct SignalDerivative {
     /// Order of the derivative; 0 for known inputs, which need no derivative of an output.
@@ -370,23 +394,8 @@ impl Elimination<'_> {
                 row.insert(k, self.s.times(&c, &inverse)?);
             }
             for other in rows.iter_mut().chain(done.iter_mut().map(|d| &mut d.1)) {
-                let Some(factor) = other.get(&m).map(|c| self.s.minus(c)) else { continue };
-                for (k, c) in &row {
-                    if factor.terms() * c.terms() > PRODUCT {
-                        return Ok(Vec::new());
-                    }
-                    let mut sum = self.s.times(&factor, c)?;
-                    if let Some(old) = other.get(k) {
-                        sum = self.s.sum(old, &sum)?;
-                    }
-                    if sum.terms() > TERMS {
-                        return Ok(Vec::new());
-                    }
-                    if sum.is_zero() {
-                        other.remove(k);
-                    } else {
-                        other.insert(k.clone(), sum);
-                    }
+                if !subtract_multiple(self.s, other, &m, &row)? {
+                    return Ok(Vec::new());
                 }
             }
             done.push((m, row));

@@ -16,9 +16,9 @@ use crate::language::file_error::{json_kind, words};
 use crate::language::{Names, parse_with};
 use crate::model::angle::excerpt;
 
-/// Layout of the object; other keys are ignored.
+/// Model as a JSON object; other keys are ignored.
 #[derive(Debug, Deserialize)]
-struct Layout {
+struct JsonModel {
     name: String,
     #[serde(default)]
     description: String,
@@ -117,6 +117,61 @@ impl JsonFile<'_> {
         Ok(PlacedExpression { text: text.text.clone(), expression, place })
     }
 
+    /// Error in the value of a key, at its first occurrence in quotes.
+    fn refuse(&self, key: &str, message: String) -> ModelError {
+        let span = self.0.find(&format!("\"{key}\"")).map(|at| at..at + key.len() + 2);
+        ModelError { what: key.into(), message, span }
+    }
+
+    /// Checks numbers, and that equations are those of states.
+    fn check(&self, layout: &JsonModel, experiments: usize) -> Result<(), ModelError> {
+        if !(1..=MAX_EXPERIMENTS).contains(&experiments) {
+            return Err(self.refuse("experiments", format!("{experiments}; expected 1 to {MAX_EXPERIMENTS}")));
+        }
+        if let Some(found) = layout.unknown_input_max_derivative.filter(|d| *d > MAX_DEGREE) {
+            let message = format!("{found}; expected at most {MAX_DEGREE}");
+            return Err(self.refuse("unknown_input_max_derivative", message));
+        }
+        if let Some(name) = layout.equations.keys().find(|n| !layout.states.contains(n)) {
+            return Err(self.refuse("equations", format!("`{name}` is no state")));
+        }
+        Ok(())
+    }
+
+    fn states(&self, layout: &JsonModel) -> Result<Vec<State>, ModelError> {
+        let mut out = Vec::new();
+        for state in &layout.states {
+            let text = layout.equations.get(state);
+            let text =
+                text.ok_or_else(|| self.refuse("equations", format!("`{state}` has none; expected one")))?;
+            let start = match layout.known_initial_values.get(state) {
+                Some(value) => {
+                    StateStart::Value(self.formula(format!("the initial value of {state}"), value)?)
+                }
+                None if layout.known_initial_conditions.contains(state) => StateStart::Known,
+                None => StateStart::Unknown,
+            };
+            let equation = self.formula(format!("the equation of {state}"), text)?;
+            out.push(State { named: named(state), equation, start });
+        }
+        Ok(out)
+    }
+
+    fn known_inputs(&self, layout: &JsonModel) -> Result<Vec<(Named, KnownInput)>, ModelError> {
+        let mut out = Vec::new();
+        for input in &layout.known_inputs {
+            let kind = match layout.input_assumption.get(input).map(|t| t.text.as_str()) {
+                None => KnownInput::Generic,
+                Some("constant") => KnownInput::Polynomial(0),
+                Some(other) => {
+                    return Err(self.refuse("input_assumption", format!("`{other}`; expected constant")));
+                }
+            };
+            out.push((named(input), kind));
+        }
+        Ok(out)
+    }
+
     /// Error for a message of the JSON reader, which states its place after the fault.
     fn refused(&self, e: &serde_json::Error) -> ModelError {
         let message = e.to_string();
@@ -149,53 +204,21 @@ fn named(name: &str) -> Named {
 pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     check_signs(text)?;
     let file = JsonFile(text);
-    // a key, at its first occurrence in quotes
-    let key = |name: &str| text.find(&format!("\"{name}\"")).map(|at| at..at + name.len() + 2);
-    let refuse = |what: &str, message: String| ModelError { what: what.into(), message, span: key(what) };
-    let layout: Layout = serde_json::from_str(text).map_err(|e| file.refused(&e))?;
+    let layout: JsonModel = serde_json::from_str(text).map_err(|e| file.refused(&e))?;
     let experiments = layout.experiments.unwrap_or(1);
-    if !(1..=MAX_EXPERIMENTS).contains(&experiments) {
-        return Err(refuse("experiments", format!("{experiments}; expected 1 to {MAX_EXPERIMENTS}")));
-    }
-    if let Some(found) = layout.unknown_input_max_derivative.filter(|d| *d > MAX_DEGREE) {
-        let message = format!("{found}; expected at most {MAX_DEGREE}");
-        return Err(refuse("unknown_input_max_derivative", message));
-    }
-    let known = |name: &String, list: &[String]| list.contains(name);
-    if let Some(name) = layout.equations.keys().find(|n| !known(n, &layout.states)) {
-        return Err(refuse("equations", format!("`{name}` is no state")));
-    }
+    file.check(&layout, experiments)?;
     let mut model = SystemModel {
         name: layout.name.clone(),
         description: layout.description.clone(),
         parameters: layout.params.iter().map(|p| named(p)).collect(),
         experiments,
+        states: file.states(&layout)?,
         ..SystemModel::default()
     };
-    for state in &layout.states {
-        let text = layout.equations.get(state);
-        let text = text.ok_or_else(|| refuse("equations", format!("`{state}` has none; expected one")))?;
-        let start = match layout.known_initial_values.get(state) {
-            Some(value) => StateStart::Value(file.formula(format!("the initial value of {state}"), value)?),
-            None if known(state, &layout.known_initial_conditions) => StateStart::Known,
-            None => StateStart::Unknown,
-        };
-        let equation = file.formula(format!("the equation of {state}"), text)?;
-        model.states.push(State { named: named(state), equation, start });
-    }
     for (name, text) in &layout.outputs.0 {
         model.outputs.push((named(name), file.formula(format!("the output {name}"), text)?));
     }
-    for input in &layout.known_inputs {
-        let kind = match layout.input_assumption.get(input).map(|t| t.text.as_str()) {
-            None => KnownInput::Generic,
-            Some("constant") => KnownInput::Polynomial(0),
-            Some(other) => {
-                return Err(refuse("input_assumption", format!("`{other}`; expected constant")));
-            }
-        };
-        model.known_inputs.push((named(input), kind));
-    }
+    model.known_inputs = file.known_inputs(&layout)?;
     let degree = layout.unknown_input_max_derivative;
     // a missing key means arbitrary: in no model is the signal itself constant
     model.unknown_inputs = layout.unknown_inputs.iter().map(|u| (named(u), degree)).collect();

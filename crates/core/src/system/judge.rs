@@ -242,6 +242,32 @@ fn climbed<S: Values>(
     Ok(PointDegrees { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
 }
 
+/// Message for a node without a value, or a derivative, at any of `points` points.
+fn no_value(compiled: &Compiled, singular: Singular, points: usize) -> String {
+    let name = |function| {
+        let named = Function::ALL.iter().find(|(_, f)| *f == function);
+        named.map_or("a function", |(name, _)| *name)
+    };
+    match singular {
+        Singular::Domain(node, _) if compiled.dag.powers.contains(&node) => format!(
+            "a power whose exponent is not known as a whole number or half of one is defined for a positive \
+             base alone, which it was at none of {points} points that were tried"
+        ),
+        Singular::Domain(_, function) => {
+            format!("{} is not defined here at any of {points} points that were tried", name(function))
+        }
+        Singular::Kink(_, function @ (Function::Asin | Function::Acos)) => format!(
+            "{} at an end of its range, where it has no derivative; expected an argument between -1 and 1",
+            name(function)
+        ),
+        Singular::Kink(_, function) => format!(
+            "{} of zero, where it has no derivative; expected an argument that is not zero",
+            name(function)
+        ),
+        _ => "division by zero at every point that was tried".into(),
+    }
+}
+
 /// Error that states where the model has no value.
 pub(super) fn singular<S: Values>(
     model: &SystemModel,
@@ -249,10 +275,6 @@ pub(super) fn singular<S: Values>(
     singular: Singular,
 ) -> ModelError {
     let points = S::ATTEMPTS;
-    let name = |function| {
-        let named = Function::ALL.iter().find(|(_, f)| *f == function);
-        named.map_or("a function", |(name, _)| *name)
-    };
     let (node, message) = match singular {
         Singular::Constraint(c) => {
             let (of, message) = (
@@ -266,32 +288,9 @@ pub(super) fn singular<S: Values>(
         Singular::Dependent(c) => return dependent_at_points(model, c),
         // reported before, with the exceeded limit
         Singular::Refused => return refuse("the limit of work".into()),
-        Singular::Division(node) => (node, "division by zero at every point that was tried".to_string()),
-        Singular::Domain(node, _) if compiled.dag.powers.contains(&node) => (
-            node,
-            format!(
-                "a power whose exponent is not known as a whole number or half of one is defined for a \
-                 positive base alone, which it was at none of {points} points that were tried"
-            ),
-        ),
-        Singular::Domain(node, function) => (
-            node,
-            format!("{} is not defined here at any of {points} points that were tried", name(function)),
-        ),
-        Singular::Kink(node, function @ (Function::Asin | Function::Acos)) => (
-            node,
-            format!(
-                "{} at an end of its range, where it has no derivative; expected an argument between -1 and 1",
-                name(function)
-            ),
-        ),
-        Singular::Kink(node, function) => (
-            node,
-            format!(
-                "{} of zero, where it has no derivative; expected an argument that is not zero",
-                name(function)
-            ),
-        ),
+        Singular::Division(node) | Singular::Domain(node, _) | Singular::Kink(node, _) => {
+            (node, no_value(compiled, singular, points))
+        }
     };
     let of_time = slots_of(&compiled.dag, node).into_iter().any(|s| compiled.roles[s] == Role::Time);
     let message = match model.time {

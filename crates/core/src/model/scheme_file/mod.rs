@@ -80,6 +80,36 @@ impl SchemeReader<'_> {
         }
     }
 
+    /// Carry, latitude, unknown terms and path.
+    fn conditions(&mut self, file: &SchemeFile, scheme: &mut Scheme) -> Result<(), SchemeFileError> {
+        if let Some(carry) = &file.carry {
+            scheme.carry = carry
+                .get_ref()
+                .parse()
+                .map_err(|e: super::scheme::CarryError| self.at(carry.span(), e.to_string()))?;
+        }
+        if let Some(latitude) = &file.latitude_deg {
+            let parsed: Result<Latitude, _> = self.number(latitude)?.parse();
+            scheme.latitude = Some(parsed.map_err(|e| self.at(latitude.span(), e.to_string()))?);
+        }
+        let frame = file.frame.as_ref();
+        let frame = frame
+            .map(|f| f.get_ref().parse::<DefinedBy>().map_err(|e| self.at(f.span(), e.to_string())))
+            .transpose()?;
+        if let Some(terms) = &file.terms {
+            self.places.insert("terms".into(), terms.span());
+            scheme.unknowns = self.terms(terms, frame)?;
+        } else if let Some(f) = &file.frame {
+            return Err(self.at(f.span(), "a frame without terms; expected terms such as [\"all\"]"));
+        }
+        if let Some(path) = &file.path {
+            self.places.insert("path".into(), path.span());
+            let parsed: Result<Path, PathError> = path.get_ref().parse();
+            scheme.path = Some(parsed.map_err(|e| self.at(path.span(), e.to_string()))?);
+        }
+        Ok(())
+    }
+
     fn numbers(&mut self, key: &str, list: &Numbers) -> std::collections::BTreeMap<String, f64> {
         let kept = list.iter().map(|(name, x)| {
             // a wrong name is marked at the name, a wrong number at the number
@@ -265,31 +295,7 @@ pub fn read(text: &str) -> Result<Scheme, SchemeFileError> {
         scheme.combinations.extend(r.keep(format!("combinations.{i}"), Some(text)));
         r.places.insert("combinations".into(), text.span());
     }
-    if let Some(carry) = &file.carry {
-        scheme.carry = carry
-            .get_ref()
-            .parse()
-            .map_err(|e: super::scheme::CarryError| r.at(carry.span(), e.to_string()))?;
-    }
-    if let Some(latitude) = &file.latitude_deg {
-        let parsed: Result<Latitude, _> = r.number(latitude)?.parse();
-        scheme.latitude = Some(parsed.map_err(|e| r.at(latitude.span(), e.to_string()))?);
-    }
-    let frame = file.frame.as_ref();
-    let frame = frame
-        .map(|f| f.get_ref().parse::<DefinedBy>().map_err(|e| r.at(f.span(), e.to_string())))
-        .transpose()?;
-    if let Some(terms) = &file.terms {
-        r.places.insert("terms".into(), terms.span());
-        scheme.unknowns = r.terms(terms, frame)?;
-    } else if let Some(f) = &file.frame {
-        return Err(r.at(f.span(), "a frame without terms; expected terms such as [\"all\"]"));
-    }
-    if let Some(path) = &file.path {
-        r.places.insert("path".into(), path.span());
-        let parsed: Result<Path, PathError> = path.get_ref().parse();
-        scheme.path = Some(parsed.map_err(|e| r.at(path.span(), e.to_string()))?);
-    }
+    r.conditions(&file, &mut scheme)?;
     r.gimbals(&file.gimbals, &mut scheme)?;
     if file.positions.is_empty() {
         return Err(whole("no position; expected at least one [[position]] table".into()));

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use crate::model::angle::{Angle, format_decimal};
 use crate::model::scheme::{Position, Scheme};
 use crate::model::settings::{FilterKind, Propagation, Settings, Truth};
-use crate::model::{Acceptance, Geometry, PerGyro, Recording, SlewAxis, Unknowns};
+use crate::model::{Acceptance, Geometry, Gimbals, PerGyro, Recording, SlewAxis, Unknowns};
 use crate::title_block::TitleBlock;
 
 /// Text of a scheme file. Reading it gives the scheme again; a comment may precede it.
@@ -27,17 +27,7 @@ pub fn write(scheme: &Scheme) -> String {
             line(&mut out, "terms", &list(terms.iter().map(|t| quoted(t.letters()))))
         }
     }
-    if scheme.geometry != Geometry::default() {
-        for (letter, g) in ["X", "Y", "Z"].iter().zip(scheme.geometry.gyros()) {
-            let axes = format!("{{ I = \"{}\", O = \"{}\", S = \"{}\" }}", g.I, g.O, g.S);
-            line(&mut out, &format!("geometry.{letter}"), &axes);
-        }
-        if !scheme.geometry.accelerometers.is_default() {
-            let [x, y, z] = scheme.geometry.accelerometers.inputs();
-            let axes = format!("{{ X = \"{x}\", Y = \"{y}\", Z = \"{z}\" }}");
-            line(&mut out, "geometry.accelerometers", &axes);
-        }
-    }
+    geometry(&mut out, &scheme.geometry);
     if let Some(path) = scheme.path {
         line(&mut out, "path", &quoted(path.name()));
     }
@@ -53,18 +43,36 @@ pub fn write(scheme: &Scheme) -> String {
     numbers(&mut out, "bench", &scheme.bench);
     numbers(&mut out, "ageing", &scheme.ageing);
     acceptance(&mut out, &scheme.acceptance);
-    let mut gimbals = String::new();
-    for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(scheme.gimbals.limits) {
-        if let Some(ends) = limit {
-            line(&mut gimbals, &format!("{name}_deg"), &list(ends.map(format_decimal)));
-        }
-    }
-    table(&mut out, "gimbals", &gimbals);
+    gimbals(&mut out, &scheme.gimbals);
     recording(&mut out, &scheme.recording);
     for p in &scheme.positions {
         position(&mut out, p);
     }
     out
+}
+
+fn geometry(out: &mut String, geometry: &Geometry) {
+    if *geometry != Geometry::default() {
+        for (letter, g) in ["X", "Y", "Z"].iter().zip(geometry.gyros()) {
+            let axes = format!("{{ I = \"{}\", O = \"{}\", S = \"{}\" }}", g.I, g.O, g.S);
+            line(out, &format!("geometry.{letter}"), &axes);
+        }
+        if !geometry.accelerometers.is_default() {
+            let [x, y, z] = geometry.accelerometers.inputs();
+            let axes = format!("{{ X = \"{x}\", Y = \"{y}\", Z = \"{z}\" }}");
+            line(out, "geometry.accelerometers", &axes);
+        }
+    }
+}
+
+fn gimbals(out: &mut String, gimbals: &Gimbals) {
+    let mut own = String::new();
+    for (name, limit) in ["alpha", "beta", "gamma"].iter().zip(gimbals.limits) {
+        if let Some(ends) = limit {
+            line(&mut own, &format!("{name}_deg"), &list(ends.map(format_decimal)));
+        }
+    }
+    table(out, "gimbals", &own);
 }
 
 fn title_block(out: &mut String, block: &TitleBlock) {
