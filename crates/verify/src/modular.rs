@@ -318,44 +318,25 @@ pub(crate) fn judge(
     rows: &[(RowName, Vec<u64>)],
     functionals: &[Vec<u64>],
 ) -> Judged {
-    let n = names.len();
     let mut witnesses: Vec<Witness> = functionals.iter().map(|_| Witness::default()).collect();
-    // reduced echelon form; the columns beyond n hold the combination of basis rows
-    let mut reduced: Vec<(usize, Vec<u64>)> = Vec::new();
+    let mut form = EchelonForm { p, n: names.len(), reduced: Vec::new() };
     let (mut basis, mut ranks) = (Vec::new(), Vec::new());
     for k in 0..=rows.iter().map(|r| r.0.1).max().unwrap_or(0) {
         for ((i, order, c), row) in rows.iter().filter(|r| r.0.1 == k) {
-            if basis.len() == n {
+            if basis.len() == names.len() {
                 break;
             }
-            let mut v = row.clone();
-            v.resize(2 * n, 0);
-            v[n + basis.len()] = 1;
-            for (pivot, e) in &reduced {
-                let factor = v[*pivot];
-                subtract(&mut v, factor, e, p);
+            if let Some(pivot) = form.insert(row) {
+                basis.push((*i, *order, *c, names[pivot].clone()));
             }
-            let Some(pivot) = (0..n).find(|&j| v[j] != 0) else { continue };
-            let scale = inverse(v[pivot], p);
-            v.iter_mut().for_each(|x| *x = times(*x, scale, p));
-            for (_, e) in &mut reduced {
-                let factor = e[pivot];
-                subtract(e, factor, &v, p);
-            }
-            reduced.push((pivot, v));
-            basis.push((*i, *order, *c, names[pivot].clone()));
         }
         ranks.push(basis.len());
         for (c, witness) in functionals.iter().zip(&mut witnesses).filter(|(_, w)| w.degree.is_none()) {
-            let mut rest = c.clone();
-            rest.resize(2 * n, 0);
-            for (pivot, e) in reduced.iter().filter(|(pivot, _)| c[*pivot] != 0) {
-                subtract(&mut rest, c[*pivot], e, p);
-            }
-            match (0..n).find(|&j| rest[j] != 0) {
+            let rest = form.rest(c);
+            match (0..names.len()).find(|&j| rest[j] != 0) {
                 Some(hidden) => witness.hidden_by = Some(names[hidden].clone()),
                 None => {
-                    let used = basis.iter().enumerate().filter(|(j, _)| rest[n + j] != 0);
+                    let used = basis.iter().enumerate().filter(|(j, _)| rest[names.len() + j] != 0);
                     witness.degree = Some(k);
                     witness.solution = Some(used.map(|(_, (i, k, c, _))| (*i, *k, *c)).collect());
                 }
@@ -365,17 +346,63 @@ pub(crate) fn judge(
     let last = ranks.iter().position(|r| *r == basis.len()).unwrap_or(0);
     ranks.truncate(last + 1);
     for (c, witness) in functionals.iter().zip(&mut witnesses) {
-        let excites = |row: &[u64]| row.iter().zip(c).any(|(x, c)| *x != 0 && *c != 0);
-        let excited = rows.iter().find(|(_, row)| excites(row)).map(|(name, _)| *name);
-        let status = match (witness.degree, excited) {
-            (Some(_), _) => "observable",
-            (None, Some(_)) => "inseparable",
-            (None, None) => "not_excited",
-        };
-        witness.status = status.into();
-        witness.excited_by = excited.filter(|_| witness.degree.is_none());
+        set_status(witness, c, rows);
     }
     Judged { basis, ranks, witnesses }
+}
+
+/// Reduced echelon form modulo `p` of rows of `n` entries.
+struct EchelonForm {
+    p: u64,
+    n: usize,
+    /// Pivots and rows; the columns beyond n hold the combination of basis rows.
+    reduced: Vec<(usize, Vec<u64>)>,
+}
+
+impl EchelonForm {
+    /// Adds a row as the next basis row; returns its pivot, `None` for a combination of the rows before.
+    fn insert(&mut self, row: &[u64]) -> Option<usize> {
+        let (p, n) = (self.p, self.n);
+        let mut v = row.to_vec();
+        v.resize(2 * n, 0);
+        v[n + self.reduced.len()] = 1;
+        for (pivot, e) in &self.reduced {
+            let factor = v[*pivot];
+            subtract(&mut v, factor, e, p);
+        }
+        let pivot = (0..n).find(|&j| v[j] != 0)?;
+        let scale = inverse(v[pivot], p);
+        v.iter_mut().for_each(|x| *x = times(*x, scale, p));
+        for (_, e) in &mut self.reduced {
+            let factor = e[pivot];
+            subtract(e, factor, &v, p);
+        }
+        self.reduced.push((pivot, v));
+        Some(pivot)
+    }
+
+    /// Rest of a functional, zero for one in the span; then minus the combination of basis rows.
+    fn rest(&self, functional: &[u64]) -> Vec<u64> {
+        let mut rest = functional.to_vec();
+        rest.resize(2 * self.n, 0);
+        for (pivot, e) in self.reduced.iter().filter(|(pivot, _)| functional[*pivot] != 0) {
+            subtract(&mut rest, functional[*pivot], e, self.p);
+        }
+        rest
+    }
+}
+
+/// Status of a functional by its degree, and the first row that excites one without a degree.
+fn set_status(witness: &mut Witness, functional: &[u64], rows: &[(RowName, Vec<u64>)]) {
+    let excites = |row: &[u64]| row.iter().zip(functional).any(|(x, c)| *x != 0 && *c != 0);
+    let excited = rows.iter().find(|(_, row)| excites(row)).map(|(name, _)| *name);
+    let status = match (witness.degree, excited) {
+        (Some(_), _) => "observable",
+        (None, Some(_)) => "inseparable",
+        (None, None) => "not_excited",
+    };
+    witness.status = status.into();
+    witness.excited_by = excited.filter(|_| witness.degree.is_none());
 }
 
 /// Number of primes, at least 2, with which a false claim passes with a probability below 1e-12, and

@@ -461,31 +461,8 @@ impl CheckedSearch {
         (replayed, seed): (usize, Option<u64>),
         found: &ReplayResult,
     ) -> Vec<String> {
-        let (n, k) = (self.problem.positions.len(), self.positions);
-        let order = if self.carry == "reset" { ", order is of no account" } else { "" };
-        let names: Vec<String> = file.problem.required.iter().map(|r| r.name.clone()).collect();
-        let how = by_primes(self.primes, self.error);
-        let mut out = vec![format!(
-            "Question: {k} positions of {n} candidates, carry {}, latitude {} deg{order}; {} of {}, dwell \
-             {} s, {} samples.",
-            self.carry,
-            file.problem.latitude_deg,
-            file.problem.criterion,
-            names.join(", "),
-            file.problem.dwell_s,
-            file.problem.samples
-        )];
-        for best in file.best.iter().take(3) {
-            let attitudes: Vec<String> =
-                best.sequence.iter().map(|c| file.problem.candidates[c - 1].join(",")).collect();
-            out.push(format!(
-                "Sequence {}: worst degree {}, criterion {:.6e}{}; evaluated again.",
-                attitudes.join(" | "),
-                file.degree,
-                best.value,
-                self.unit
-            ));
-        }
+        let mut out = vec![self.question(file)];
+        out.extend(file.best.iter().take(3).map(|best| self.evaluated(file, best)));
         if file.best.len() > 3 {
             out.push(format!("{} more sequences of the list; evaluated again.", file.best.len() - 3));
         }
@@ -497,25 +474,7 @@ impl CheckedSearch {
             listed(&firsts.iter().map(|c| c - 1).collect::<Vec<_>>()),
             self.space.maps.len()
         ));
-        let chosen = seed.map_or_else(String::new, |seed| format!(", chosen by seed {seed}"));
-        let least = match found.counted {
-            0 => "none of this degree within the caps".into(),
-            _ => format!("none below {:.6e}{}", found.at_least * (1.0 - DIGITS), self.unit),
-        };
-        out.push(match replayed {
-            0 => format!(
-                "No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."
-            ),
-            _ => format!(
-                "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of \
-                 a smaller one, {least}; {} sets judged {how}.",
-                file.blocks.len(),
-                found.sequences,
-                found.counted,
-                file.degree,
-                self.space.judged_sets()
-            ),
-        });
+        out.push(self.searched_again(file, (replayed, seed), found));
         out.push(match file.blocks.len() - replayed {
             0 => {
                 format!(
@@ -534,6 +493,62 @@ impl CheckedSearch {
                 .into(),
         );
         out
+    }
+
+    fn question(&self, file: &Optimum) -> String {
+        let (n, k) = (self.problem.positions.len(), self.positions);
+        let order = if self.carry == "reset" { ", order is of no account" } else { "" };
+        let names: Vec<String> = file.problem.required.iter().map(|r| r.name.clone()).collect();
+        format!(
+            "Question: {k} positions of {n} candidates, carry {}, latitude {} deg{order}; {} of {}, dwell \
+             {} s, {} samples.",
+            self.carry,
+            file.problem.latitude_deg,
+            file.problem.criterion,
+            names.join(", "),
+            file.problem.dwell_s,
+            file.problem.samples
+        )
+    }
+
+    fn evaluated(&self, file: &Optimum, best: &RawBest) -> String {
+        let attitudes: Vec<String> =
+            best.sequence.iter().map(|c| file.problem.candidates[c - 1].join(",")).collect();
+        format!(
+            "Sequence {}: worst degree {}, criterion {:.6e}{}; evaluated again.",
+            attitudes.join(" | "),
+            file.degree,
+            best.value,
+            self.unit
+        )
+    }
+
+    fn searched_again(
+        &self,
+        file: &Optimum,
+        (replayed, seed): (usize, Option<u64>),
+        found: &ReplayResult,
+    ) -> String {
+        let how = by_primes(self.primes, self.error);
+        let chosen = seed.map_or_else(String::new, |seed| format!(", chosen by seed {seed}"));
+        let least = match found.counted {
+            0 => "none of this degree within the caps".into(),
+            _ => format!("none below {:.6e}{}", found.at_least * (1.0 - DIGITS), self.unit),
+        };
+        match replayed {
+            0 => format!(
+                "No block searched again: each has more than {ALL_UP_TO} sequences; --blocks 1 searches one."
+            ),
+            _ => format!(
+                "{replayed} of {} blocks searched again{chosen}: {} sequences, {} of worst degree {}, none of \
+                 a smaller one, {least}; {} sets judged {how}.",
+                file.blocks.len(),
+                found.sequences,
+                found.counted,
+                file.degree,
+                self.space.judged_sets()
+            ),
+        }
     }
 }
 

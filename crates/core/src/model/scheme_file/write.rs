@@ -247,7 +247,7 @@ mod tests {
     use crate::model::Path;
     use crate::model::scheme_file::read;
     use crate::model::settings::DriftNoise;
-    use crate::model::{Carry, Dwell, Gimbals, Rotation, SlewTo, Term};
+    use crate::model::{Carry, Dwell, Rotation, SlewTo, Term};
     use proptest::prelude::*;
 
     fn numbers(range: std::ops::Range<i32>) -> impl Strategy<Value = BTreeMap<String, f64>> {
