@@ -139,9 +139,9 @@ fn end_group(leader: u32) {
 fn end_group(_: u32) {}
 
 /// Print that goes on, abandoned at its end.
-struct Going;
+struct RunningPrint;
 
-impl Drop for Going {
+impl Drop for RunningPrint {
     fn drop(&mut self) {
         abandon();
     }
@@ -161,7 +161,7 @@ pub(crate) fn print(browser: &Path, page: &[u8]) -> Result<Vec<u8>, Failure> {
 fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, String> {
     let folder = private_folder().map_err(|e| e.to_string())?;
     *GOING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder.clone(), None));
-    let _going = Going;
+    let _going = RunningPrint;
     let [html, pdf, profile] = ["review.html", "review.pdf", "profile"].map(|name| folder.join(name));
     fs::write(&html, page).map_err(|e| e.to_string())?;
     let mut command = Command::new(browser);

@@ -261,18 +261,18 @@ fn answered<W: OutputForm>(
         "procedure" => planned::<W>(request),
         "calibrate" => calibrated_from_texts::<W>(request, host),
         "allan" => {
-            let asked: Request<Allan, StaticRecords> = Request::read(request)?;
+            let asked: CommandRequest<Allan, StaticRecords> = CommandRequest::read(request)?;
             let records = asked.files.records.into_iter().map(of_text).collect::<Result<_, _>>()?;
             noise_of::<W>(&asked.options, records, host)
         }
         "compare" => {
-            let asked: Request<Compare, Sources> = Request::read(request)?;
+            let asked: CommandRequest<Compare, Sources> = CommandRequest::read(request)?;
             W::whole(compare(&asked.options, read(asked.files.sources)?)?, true, none)
         }
         "design" => designed::<W>(request, host),
         "report" => reviewed::<W>(request, host),
         "paper" => {
-            let asked: Request<Paper, NoFiles> = Request::read(request)?;
+            let asked: CommandRequest<Paper, NoFiles> = CommandRequest::read(request)?;
             W::whole(paper(&asked.options)?, true, none)
         }
         _ => {
@@ -283,7 +283,7 @@ fn answered<W: OutputForm>(
 
 /// Verdicts on schemes and models.
 fn analyzed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
-    let mut asked: Request<Analyze, Sources> = Request::read(request)?;
+    let mut asked: CommandRequest<Analyze, Sources> = CommandRequest::read(request)?;
     asked.options.input.given = asked.given;
     let read = asked.options.input.read(asked.files.sources)?;
     let judged = analyze(&asked.options, &read, host)?;
@@ -298,7 +298,7 @@ fn analyzed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> 
 
 /// A simulated run.
 fn simulated<W: OutputForm>(request: Map<String, Value>) -> Result<W::Out, Problem> {
-    let mut asked: Request<Simulate, Sources> = Request::read(request)?;
+    let mut asked: CommandRequest<Simulate, Sources> = CommandRequest::read(request)?;
     asked.options.input.given = asked.given;
     let input = asked.options.input.read_one(asked.files.sources)?;
     let (run, traces) = simulate(&asked.options, &input)?;
@@ -307,7 +307,7 @@ fn simulated<W: OutputForm>(request: Map<String, Value>) -> Result<W::Out, Probl
 
 /// Evidence on a scheme or a model.
 fn crosschecked<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
-    let mut asked: Request<Crosscheck, Sources> = Request::read(request)?;
+    let mut asked: CommandRequest<Crosscheck, Sources> = CommandRequest::read(request)?;
     asked.options.input.given = asked.given;
     let input = asked.options.input.read_one(asked.files.sources)?;
     let evidence = crosscheck(&asked.options, &input, host)?;
@@ -317,7 +317,7 @@ fn crosschecked<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>)
 
 /// The sheet of a run.
 fn planned<W: OutputForm>(request: Map<String, Value>) -> Result<W::Out, Problem> {
-    let mut asked: Request<Procedure, Planning> = Request::read(request)?;
+    let mut asked: CommandRequest<Procedure, Planning> = CommandRequest::read(request)?;
     asked.options.input.given = asked.given;
     let Planning { sources, rotations } = asked.files;
     let planned = procedure(&asked.options, sources, rotations.as_ref())?;
@@ -330,7 +330,7 @@ fn calibrated_from_texts<W: OutputForm>(
     request: Map<String, Value>,
     host: &mut Host<'_>,
 ) -> Result<W::Out, Problem> {
-    let mut asked: Request<Calibrate, Records> = Request::read(request)?;
+    let mut asked: CommandRequest<Calibrate, Records> = CommandRequest::read(request)?;
     asked.options.given = asked.given;
     let Records { sources, records, before } = asked.files;
     let source = one(sources)?;
@@ -340,7 +340,7 @@ fn calibrated_from_texts<W: OutputForm>(
 
 /// Found schemes, or sets of outputs.
 fn designed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
-    let asked: Request<Search, SearchFiles> = Request::read(request)?;
+    let asked: CommandRequest<Search, SearchFiles> = CommandRequest::read(request)?;
     match design(&asked.options, &asked.files, host)? {
         Designed::Schemes(found) => W::whole(*found, true, |f, pictures| f.files(pictures)),
         Designed::Walks(found) => W::whole(*found, true, |f, _| Ok(f.files())),
@@ -355,7 +355,7 @@ fn designed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> 
 
 /// The page of a review.
 fn reviewed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> Result<W::Out, Problem> {
-    let mut asked: Request<Report, Pages> = Request::read(request)?;
+    let mut asked: CommandRequest<Report, Pages> = CommandRequest::read(request)?;
     asked.options.given = asked.given.without("runs");
     let Pages { sources, calibrations, command } = asked.files;
     let origin = origin(command, sources.iter().chain(calibrations.iter().map(|c| &c.source)));
@@ -416,13 +416,13 @@ struct Pages {
 struct NoFiles {}
 
 /// Options and files of a command, and the given options that concern one kind of file only.
-struct Request<O, F> {
+struct CommandRequest<O, F> {
     options: O,
     files: F,
     given: Given,
 }
 
-impl<O, F> Request<O, F>
+impl<O, F> CommandRequest<O, F>
 where
     O: Default + Serialize + DeserializeOwned,
     F: Default + Serialize + DeserializeOwned,
@@ -500,7 +500,7 @@ fn position_figures(read: &[Named]) -> Vec<File> {
 /// Defect of the request or of a record.
 pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
     let answer = || {
-        let mut asked: Request<Calibrate, Records> = Request::read(object(request)?)?;
+        let mut asked: CommandRequest<Calibrate, Records> = CommandRequest::read(object(request)?)?;
         asked.options.given = asked.given;
         let source = one(asked.files.sources)?;
         calibrated::<AllFormats>(&asked.options, source, records, asked.files.before.as_ref(), host)
@@ -514,7 +514,7 @@ pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) 
 /// Defect of the request or of the record.
 pub fn call_allan(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
     let answer = || {
-        let asked: Request<Allan, StaticRecords> = Request::read(object(request)?)?;
+        let asked: CommandRequest<Allan, StaticRecords> = CommandRequest::read(object(request)?)?;
         noise_of::<AllFormats>(&asked.options, records, host)
     };
     answer().map_err(in_snake_case)

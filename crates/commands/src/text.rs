@@ -9,13 +9,13 @@ use serde::{Deserialize, Deserializer, Serializer};
 /// A text, or a number.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "expected a text or a number")]
-enum Text {
+enum TextOrNumber {
     Written(String),
     Whole(i64),
     Number(f64),
 }
 
-impl Text {
+impl TextOrNumber {
     fn read<T: FromStr<Err: Display>, E: Error>(self) -> Result<T, E> {
         let text = match self {
             Self::Written(text) => text,
@@ -38,20 +38,20 @@ where
     T: FromStr<Err: Display>,
     D: Deserializer<'de>,
 {
-    Option::<Text>::deserialize(from)?.map(Text::read).transpose()
+    Option::<TextOrNumber>::deserialize(from)?.map(TextOrNumber::read).transpose()
 }
 
 /// Lists of such options.
 pub(crate) mod list {
     use std::collections::BTreeMap;
 
-    use super::{Deserialize, Deserializer, Display, FromStr, Serializer, Text};
+    use super::{Deserialize, Deserializer, Display, FromStr, Serializer, TextOrNumber};
 
     /// Texts, or numbers by name: `["D=0.05"]` and `{"D": 0.05}` are the same.
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "expected a list of texts, or numbers by name")]
     enum List {
-        List(Vec<Text>),
+        List(Vec<TextOrNumber>),
         Named(BTreeMap<String, f64>),
     }
 
@@ -65,9 +65,9 @@ pub(crate) mod list {
         D: Deserializer<'de>,
     {
         match List::deserialize(from)? {
-            List::List(list) => list.into_iter().map(Text::read).collect(),
+            List::List(list) => list.into_iter().map(TextOrNumber::read).collect(),
             List::Named(named) => {
-                let text = |(name, value): (String, f64)| Text::Written(format!("{name}={value}"));
+                let text = |(name, value): (String, f64)| TextOrNumber::Written(format!("{name}={value}"));
                 named.into_iter().map(|pair| text(pair).read()).collect()
             }
         }

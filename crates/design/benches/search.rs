@@ -6,8 +6,8 @@ use divan::{Bencher, black_box};
 use obsdeg_core::model::{Carry, Scheme};
 use obsdeg_core::system::{OutputRows, gather, json};
 use obsdeg_design::design::{
-    Best, Candidates, Constraints, Criterion, CriterionName, Design, DesignOptions, Evaluator, Rows, Search,
-    design,
+    AttitudeRows, Best, Candidates, Constraints, Criterion, CriterionName, Design, DesignOptions, Evaluator,
+    SequenceSearch, design,
 };
 use obsdeg_design::sensors::{Ordered, Ranks, Set};
 use obsdeg_evidence::simulation::Conditions;
@@ -26,7 +26,7 @@ fn base(carry: Carry) -> Scheme {
 /// Exact verdicts of all sets of six of the 24 cardinal attitudes, on all cores; items are sets.
 #[divan::bench(args = [Carry::Platform, Carry::Inertial, Carry::Reset])]
 fn sets_of_six(bencher: Bencher<'_, '_>, carry: &Carry) {
-    let rows = Rows::new(&base(*carry), &Candidates::cardinals().attitudes, &ALL, 1).expect("rows");
+    let rows = AttitudeRows::new(&base(*carry), &Candidates::cardinals().attitudes, &ALL, 1).expect("rows");
     bencher.counter(ItemsCount::new(134_596usize)).bench(|| black_box(rows.observable_sets(6).len()));
 }
 
@@ -57,9 +57,9 @@ fn twelve_certified(bencher: Bencher<'_, '_>) {
     let candidates = Candidates::cardinals();
     let base = base(Carry::Reset);
     bencher.bench(|| {
-        let rows = Rows::new(&base, &candidates.attitudes, &ALL, 1).expect("rows");
+        let rows = AttitudeRows::new(&base, &candidates.attitudes, &ALL, 1).expect("rows");
         let evaluator = reset(&candidates);
-        let search = Search {
+        let search = SequenceSearch {
             rows: &rows,
             walks: false,
             evaluator: &evaluator,
@@ -121,9 +121,9 @@ fn sigma_of_five(bencher: Bencher<'_, '_>) {
 fn best_five_of_24(bencher: Bencher<'_, '_>) {
     let base = base(Carry::Inertial);
     let candidates = Candidates::cardinals().attitudes;
-    let rows = Rows::new(&base, &candidates, &ALL, 1).expect("rows");
+    let rows = AttitudeRows::new(&base, &candidates, &ALL, 1).expect("rows");
     let evaluator = Evaluator::new(&base, &candidates, &ALL, &Conditions::default()).expect("an evaluator");
-    let search = Search {
+    let search = SequenceSearch {
         rows: &rows,
         walks: false,
         evaluator: &evaluator,
@@ -153,9 +153,9 @@ fn best_six_of_24_pruned(bencher: Bencher<'_, '_>, carry: &Carry) {
 fn pruned(carry: Carry, k: usize) -> Best {
     let base = base(carry);
     let candidates = Candidates::cardinals().attitudes;
-    let rows = Rows::new(&base, &candidates, &ALL, 1).expect("rows");
+    let rows = AttitudeRows::new(&base, &candidates, &ALL, 1).expect("rows");
     let evaluator = Evaluator::new(&base, &candidates, &ALL, &Conditions::default()).expect("an evaluator");
-    let search = Search {
+    let search = SequenceSearch {
         rows: &rows,
         evaluator: &evaluator,
         criterion: &Criterion::Worst,

@@ -32,21 +32,21 @@ pub(crate) fn picture(name: &str, svg: String) -> Result<[File; 2], FigureError>
 }
 
 /// Picture before it is drawn.
-enum Planned {
+enum UndrawnPicture {
     One(Figure),
     /// Figures in three columns under a title.
     Grid(Vec<Figure>, String),
 }
 
 /// Pictures with their names as files, in this order, drawn on all threads.
-fn drawn(all: &[(String, Planned)]) -> Result<Vec<File>, FigureError> {
+fn drawn(all: &[(String, UndrawnPicture)]) -> Result<Vec<File>, FigureError> {
     let files = parallel::try_map(all.len(), |i| {
         let (name, planned) = &all[i];
         picture(
             name,
             match planned {
-                Planned::One(figure) => figure.svg(),
-                Planned::Grid(figures, title) => grid(figures, 3, title),
+                UndrawnPicture::One(figure) => figure.svg(),
+                UndrawnPicture::Grid(figures, title) => grid(figures, 3, title),
             },
         )
     })?;
@@ -241,10 +241,10 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
         (errors, ".error", "Error (absolute value of estimate minus truth) and 3 sigma"),
     ] {
         for (figure, name) in figures.iter().zip(&record.names) {
-            planned.push((format!("{}{end}", file_name(name)), Planned::One(figure.clone())));
+            planned.push((format!("{}{end}", file_name(name)), UndrawnPicture::One(figure.clone())));
         }
         let some: Vec<Figure> = unknowns.iter().take(GRID).map(|&i| figures[i].clone()).collect();
-        planned.push((format!("all{end}"), Planned::Grid(some, format!("{title}{part}"))));
+        planned.push((format!("all{end}"), UndrawnPicture::Grid(some, format!("{title}{part}"))));
         let numbered = |(k, &i): (usize, &usize)| Figure {
             title: format!("{}: {}", k + 2, figures[i].title),
             ..figures[i].clone()
@@ -252,11 +252,11 @@ pub fn simulation_figures(record: &Traces) -> Result<Vec<File>, FigureError> {
         if let Some(papers) = &papers {
             let some: Vec<Figure> = papers.iter().enumerate().map(numbered).collect();
             let title = format!("{title}: the unknowns of the paper's figures 2 to 10");
-            planned.push((format!("figures-2-to-10{end}"), Planned::Grid(some, title)));
+            planned.push((format!("figures-2-to-10{end}"), UndrawnPicture::Grid(some, title)));
         }
     }
     // the largest first, so that no thread is left with one at the end
-    planned.sort_by_key(|(_, what)| matches!(what, Planned::One(_)));
+    planned.sort_by_key(|(_, what)| matches!(what, UndrawnPicture::One(_)));
     drawn(&planned)
 }
 

@@ -60,12 +60,12 @@ pub(crate) struct Globe {
 }
 
 /// Spots with the same direction of Up.
-struct Place<'a> {
+struct SpotGroup<'a> {
     up: [f64; 3],
     spots: Vec<&'a Spot>,
 }
 
-impl Place<'_> {
+impl SpotGroup<'_> {
     fn is_at(&self, up: &[f64; 3]) -> bool {
         (0..3).all(|k| (self.up[k] - up[k]).abs() < 1e-6)
     }
@@ -106,20 +106,20 @@ pub(crate) fn bearing(c: &Matrix3<f64>) -> f64 {
 }
 
 /// Places with their spots.
-fn places(spots: &[Spot]) -> Vec<Place<'_>> {
-    let mut out: Vec<Place<'_>> = Vec::new();
+fn places(spots: &[Spot]) -> Vec<SpotGroup<'_>> {
+    let mut out: Vec<SpotGroup<'_>> = Vec::new();
     for spot in spots {
         let up = row(&spot.attitude, 1);
         match out.iter_mut().find(|p| p.is_at(&up)) {
             Some(place) => place.spots.push(spot),
-            None => out.push(Place { up, spots: vec![spot] }),
+            None => out.push(SpotGroup { up, spots: vec![spot] }),
         }
     }
     out
 }
 
 /// Radius of points that do not touch each other, in pixels.
-fn radius(places: &[Place<'_>]) -> f64 {
+fn radius(places: &[SpotGroup<'_>]) -> f64 {
     let at: Vec<[f64; 2]> = places.iter().map(|p| projected(sphere(p.up))).collect();
     let mut least = f64::MAX;
     for (i, a) in at.iter().enumerate() {
@@ -197,7 +197,7 @@ impl Globe {
     }
 
     /// Names of the six directions of the axes, below their points.
-    fn axes(&self, out: &mut String, places: &[Place<'_>], r: f64) {
+    fn axes(&self, out: &mut String, places: &[SpotGroup<'_>], r: f64) {
         for (k, name) in ["X_p", "Y_p", "Z_p"].iter().enumerate() {
             for (sign, word) in [(1.0, "up"), (-1.0, "down")] {
                 let mut up = [0.0; 3];
@@ -239,7 +239,7 @@ impl Globe {
 }
 
 /// Half the smallest angle between two wedges of a point, in rad: they do not overlap.
-fn half_width(place: &Place<'_>) -> f64 {
+fn half_width(place: &SpotGroup<'_>) -> f64 {
     let mut all: Vec<f64> = place.spots.iter().map(|s| bearing(&s.attitude)).collect();
     all.sort_by(f64::total_cmp);
     let next = all.iter().skip(1).copied().chain(all.first().map(|first| first + TAU));
@@ -249,7 +249,7 @@ fn half_width(place: &Place<'_>) -> f64 {
 }
 
 /// Draws a point with a wedge for each of its attitudes; wedges with a thick border come last.
-fn draw(out: &mut String, place: &Place<'_>, r: f64) {
+fn draw(out: &mut String, place: &SpotGroup<'_>, r: f64) {
     let [x, y] = projected(sphere(place.up));
     let half = half_width(place);
     let _ = write!(out, "<g transform=\"translate({x:.1} {y:.1})\">");

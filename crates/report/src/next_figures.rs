@@ -37,7 +37,7 @@ fn attitude(angles: &str) -> Option<Matrix3<f64>> {
 }
 
 /// Quantity that colours the map.
-enum Criterion {
+enum MapQuantity {
     /// Number of undetermined coefficients.
     Undetermined,
     /// Largest ratio of uncertainty to requirement.
@@ -46,7 +46,7 @@ enum Criterion {
     Sigma,
 }
 
-impl Criterion {
+impl MapQuantity {
     /// Verdicts if they differ; uncertainty otherwise.
     fn of(n: &NextPositions) -> Self {
         let open = |c: &CandidateGain| c.not_observable;
@@ -105,10 +105,10 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(criterion: &Criterion, all: &[CandidateGain]) -> Self {
+    fn of(criterion: &MapQuantity, all: &[CandidateGain]) -> Self {
         let values = all.iter().filter_map(|c| criterion.value(c));
         let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-        Self { low, high, is_log: !matches!(criterion, Criterion::Undetermined) && low > 0.0 }
+        Self { low, high, is_log: !matches!(criterion, MapQuantity::Undetermined) && low > 0.0 }
     }
 
     fn place(&self, x: f64) -> f64 {
@@ -126,11 +126,11 @@ impl Scale {
         }
     }
 
-    fn steps(&self, criterion: &Criterion) -> Vec<ScaleStep> {
+    fn steps(&self, criterion: &MapQuantity) -> Vec<ScaleStep> {
         if self.low > self.high {
             return Vec::new();
         }
-        if matches!(criterion, Criterion::Undetermined) {
+        if matches!(criterion, MapQuantity::Undetermined) {
             let whole = self.low as usize..=self.high as usize;
             let step = |k: usize| ScaleStep { color: shade(self.place(k as f64)), label: k.to_string() };
             return whole.map(step).collect();
@@ -161,7 +161,7 @@ fn subject(n: &NextPositions) -> String {
 }
 
 fn attitudes(n: &NextPositions) -> Globe {
-    let criterion = Criterion::of(n);
+    let criterion = MapQuantity::of(n);
     let scale = Scale::of(&criterion, &n.by_candidate);
     let best = n.found.first().and_then(|e| e.positions.first()).map(|p| &p.candidate);
     let spot = |c: &CandidateGain| {
@@ -171,12 +171,12 @@ fn attitudes(n: &NextPositions) -> Globe {
     };
     let positions = n.positions.iter().zip(&n.position_angles);
     let before = n.before.as_ref().map(|b| match criterion {
-        Criterion::Undetermined => b.not_observable.len().to_string(),
-        Criterion::Ratio => {
+        MapQuantity::Undetermined => b.not_observable.len().to_string(),
+        MapQuantity::Ratio => {
             let worst = b.requirements.worst.as_ref();
             worst.map_or_else(|| "-".into(), |w| format!("{} ({})", short(1.0 / w.margin), w.name))
         }
-        Criterion::Sigma => b.worst.as_ref().map_or_else(|| "-".into(), stated::worst_sigma),
+        MapQuantity::Sigma => b.worst.as_ref().map_or_else(|| "-".into(), stated::worst_sigma),
     });
     let mut notes = vec![
         "Point: direction of Up in the platform's axes. Wedge: opens towards North, as seen from the platform."
@@ -249,10 +249,10 @@ mod tests {
         let scale = Scale { low: 0.1, high: 10.0, is_log: true };
         assert!((scale.place(1.0) - 0.5).abs() < 1e-12 && (scale.at(0.5) - 1.0).abs() < 1e-12);
         assert_eq!([scale.place(0.1), scale.place(10.0)], [1.0, 0.0]);
-        let steps = scale.steps(&Criterion::Sigma);
+        let steps = scale.steps(&MapQuantity::Sigma);
         let labels: Vec<&str> = steps.iter().map(|s| s.label.as_str()).filter(|l| !l.is_empty()).collect();
         assert_eq!(labels, ["0.10", "1.0", "10"]);
         let equal = Scale { low: 2.0, high: 2.0, is_log: true };
-        assert_eq!((equal.place(2.0), equal.steps(&Criterion::Sigma).len()), (1.0, 1));
+        assert_eq!((equal.place(2.0), equal.steps(&MapQuantity::Sigma).len()), (1.0, 1));
     }
 }

@@ -53,7 +53,7 @@ pub(crate) enum BuildError {
 }
 
 /// WebAssembly and the script that calls it.
-struct Module {
+struct WasmModule {
     wasm: Vec<u8>,
     script: String,
 }
@@ -109,7 +109,7 @@ fn compile(root: &Path) -> Result<Vec<PathBuf>, BuildError> {
 }
 
 /// The compiled module of that name, with the script that calls it.
-fn glued(compiled: &[PathBuf], name: &str) -> Result<Module, BuildError> {
+fn glued(compiled: &[PathBuf], name: &str) -> Result<WasmModule, BuildError> {
     let file =
         compiled.iter().find(|p| p.file_stem().is_some_and(|s| s == name)).ok_or(BuildError::Compiler)?;
     let glue = || {
@@ -118,7 +118,7 @@ fn glued(compiled: &[PathBuf], name: &str) -> Result<Module, BuildError> {
         bindgen.typescript(false).remove_name_section(true).remove_producers_section(true).generate_output()
     };
     let mut output = glue().map_err(|e| BuildError::Glue(format!("{e:#}")))?;
-    Ok(Module { wasm: output.wasm_mut().emit_wasm(), script: output.js().into() })
+    Ok(WasmModule { wasm: output.wasm_mut().emit_wasm(), script: output.js().into() })
 }
 
 /// Bytes packed with LZMA.

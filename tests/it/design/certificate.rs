@@ -4,7 +4,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix};
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
-use obsdeg_design::design::{Candidates, Criterion, CriterionName, Design, DesignOptions, Evaluator, Limits};
+use obsdeg_design::design::{
+    Candidates, Criterion, CriterionName, Design, DesignOptions, Evaluator, SigmaLimits,
+};
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_exact::SplitMix64;
 
@@ -259,7 +261,7 @@ fn no_scheme_of_tasks_is_below_the_bound(tasks: usize) {
             1 => Criterion::A,
             2 => Criterion::D,
             3 => Criterion::E,
-            _ => Criterion::Margin(Limits {
+            _ => Criterion::Margin(SigmaLimits {
                 coefficients: counting.iter().map(|_| 10f64.powf(between(-3.0, 1.0))).collect(),
                 psi: [psi_limit, psi_limit * 1.5, f64::INFINITY],
             }),

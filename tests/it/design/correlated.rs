@@ -237,7 +237,7 @@ fn designs_count_correlated_noise() {
         let search = found.search.as_ref().expect("a search");
         assert!(search.proven && search.order_matters && search.certificate.is_none(), "{carry}");
         let equal = found.found.iter().find(|f| f.dwells_s.is_empty()).expect("equal dwells");
-        let rows = Rows::new(&like, &candidates.attitudes, &[0, 1, 2, 3, 4, 5], 1).expect("rows");
+        let rows = AttitudeRows::new(&like, &candidates.attitudes, &[0, 1, 2, 3, 4, 5], 1).expect("rows");
         let (mut least, mut orders) = (f64::INFINITY, f64::NEG_INFINITY);
         for i in 0..256 {
             let sequence: Vec<usize> = (0..4).map(|p| i / 4usize.pow(p) % 4).collect();

@@ -3,7 +3,7 @@
 use obsdeg_core::model::c_n_f64;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_design::design::{
-    Candidates, Criterion, CriterionName, Design, DesignOptions, Evaluator, Everywhere, Limits,
+    Candidates, Criterion, CriterionName, Design, DesignOptions, Evaluator, Everywhere, SigmaLimits,
 };
 use obsdeg_exact::SplitMix64;
 
@@ -76,7 +76,7 @@ fn both(
         CriterionName::A => Criterion::A,
         CriterionName::D => Criterion::D,
         CriterionName::E => Criterion::E,
-        CriterionName::Margin => Criterion::Margin(Limits { coefficients: limits, psi: [0.1; 3] }),
+        CriterionName::Margin => Criterion::Margin(SigmaLimits { coefficients: limits, psi: [0.1; 3] }),
     };
     let all: Vec<usize> = (0..m).collect();
     let evaluator = Evaluator::new(&base, &grid.attitudes, &all, &conditions).expect("an evaluator");
@@ -161,7 +161,9 @@ impl DesignPair {
 
 fn without_psi(criterion: &Criterion) -> Criterion {
     match criterion {
-        Criterion::Margin(limits) => Criterion::Margin(Limits { psi: [f64::INFINITY; 3], ..limits.clone() }),
+        Criterion::Margin(limits) => {
+            Criterion::Margin(SigmaLimits { psi: [f64::INFINITY; 3], ..limits.clone() })
+        }
         other => other.clone(),
     }
 }

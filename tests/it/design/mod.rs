@@ -21,7 +21,9 @@ mod whole;
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Dwell, Scheme, SlewAxis, SlewTo, cardinal};
-use obsdeg_design::design::{Candidates, Design, DesignOptions, Evaluator, Found, Progress, Rows, design};
+use obsdeg_design::design::{
+    AttitudeRows, Candidates, Design, DesignOptions, Evaluator, Found, Progress, design,
+};
 use obsdeg_evidence::simulation::Conditions;
 
 fn base(carry: Carry) -> Scheme {
@@ -43,8 +45,8 @@ fn designed(carry: Carry, options: &DesignOptions) -> Design {
     design(&base(carry), &quiet(), options, &on).expect("designed")
 }
 
-fn rows_of(carry: Carry, candidates: &Candidates) -> Rows {
-    Rows::new(&base(carry), &candidates.attitudes, &ALL, 1).expect("rows")
+fn rows_of(carry: Carry, candidates: &Candidates) -> AttitudeRows {
+    AttitudeRows::new(&base(carry), &candidates.attitudes, &ALL, 1).expect("rows")
 }
 
 fn evaluator_of(carry: Carry, candidates: &Candidates) -> Evaluator {

@@ -3,8 +3,8 @@
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Euler, Scheme, c_n_f64, cardinal, parse_attitude};
 use obsdeg_design::design::{
-    Candidates, Constraints, Criterion, CriterionName, Design, DesignError, DesignOptions, Evaluator, Limits,
-    Rows, Search, Stop, Symmetry, design,
+    AttitudeRows, CandidateSymmetry, Candidates, Constraints, Criterion, CriterionName, Design, DesignError,
+    DesignOptions, Evaluator, SequenceSearch, SigmaLimits, Stop, design,
 };
 use obsdeg_evidence::compare::predicted;
 use obsdeg_evidence::simulation::{Conditions, Plan};
@@ -64,7 +64,7 @@ fn task(seed: u64) -> Task {
             if attitudes.is_empty() {
                 return (candidates, Vec::new());
             }
-            let rows = Rows::new(&base, &candidates.attitudes, &super::ALL, 5).expect("rows");
+            let rows = AttitudeRows::new(&base, &candidates.attitudes, &super::ALL, 5).expect("rows");
             let few: Vec<usize> = (0..k).map(|_| rng.below(candidates.names.len() as u64) as usize).collect();
             let seen: Vec<&str> =
                 NAMES.into_iter().zip(rows.degrees(&few)).filter_map(|(n, d)| d.map(|_| n)).collect();
@@ -117,8 +117,8 @@ fn task(seed: u64) -> Task {
 }
 
 /// Limits of the coefficients, without requirements on psi.
-fn limits_of(coefficients: &[f64]) -> Limits {
-    Limits { coefficients: coefficients.to_vec(), psi: [f64::INFINITY; 3] }
+fn limits_of(coefficients: &[f64]) -> SigmaLimits {
+    SigmaLimits { coefficients: coefficients.to_vec(), psi: [f64::INFINITY; 3] }
 }
 
 /// Sequence that meets every constraint.
@@ -132,7 +132,7 @@ struct SequenceScore {
 /// Task with all its sequences evaluated.
 struct EvaluatedTask {
     candidates: Candidates,
-    rows: Rows,
+    rows: AttitudeRows,
     evaluator: Evaluator,
     criterion: Criterion,
     constraints: Constraints,
@@ -163,7 +163,7 @@ fn prepared(t: &Task) -> (EvaluatedTask, Vec<usize>, Vec<f64>) {
     let asked = |name: &str| t.options.required.iter().any(|r| name.starts_with(r.as_str()));
     let required: Vec<usize> =
         (0..12).filter(|&c| t.options.required.is_empty() || asked(NAMES[c])).collect();
-    let rows = Rows::new(&t.base, &candidates.attitudes, &required, 99).expect("rows");
+    let rows = AttitudeRows::new(&t.base, &candidates.attitudes, &required, 99).expect("rows");
     let evaluator =
         Evaluator::new(&t.base, &candidates.attitudes, &required, &t.conditions).expect("an evaluator");
     let limits: Vec<f64> = required
@@ -385,7 +385,7 @@ fn searches_order_as_brute_force(tasks: usize) {
             let found = design(&t.base, &t.conditions, &t.options, &on);
             hold_exhaustion(seed, &t, &all, &found);
             // exchange may miss the best sequence, but its values are correct and never better than the best
-            let search = Search {
+            let search = SequenceSearch {
                 rows: &all.rows,
                 walks: false,
                 evaluator: &all.evaluator,
@@ -447,7 +447,7 @@ fn bounds_miss_nothing(tasks: u64) {
             let stated = known.into_iter().map(|(name, value)| Assignment { name, value });
             t.conditions.priors.extend(stated.take(seed as usize % 4));
             let all = prepared(&t).0;
-            let search = Search {
+            let search = SequenceSearch {
                 rows: &all.rows,
                 evaluator: &all.evaluator,
                 criterion: &all.criterion,
@@ -458,7 +458,7 @@ fn bounds_miss_nothing(tasks: u64) {
                 progress: &on,
             };
             let (symmetry, k) =
-                (Symmetry::none(all.candidates.names.len()), t.options.positions.expect("a number"));
+                (CandidateSymmetry::none(all.candidates.names.len()), t.options.positions.expect("a number"));
             let (whole, pruned) = (search.exhaust(&symmetry, k), search.exhaust_pruned(&symmetry, k, seed));
             assert_eq!(pruned.found, whole.found, "{seed}");
             assert_eq!(pruned.front, whole.front, "{seed}");

@@ -153,7 +153,7 @@ fn designs_count_the_prior() {
                 by_samples(&there, &conditions).into_iter().filter(|(name, _)| name.starts_with("D_"));
             drifts.map(|(_, s)| s).fold(0.0, f64::max)
         };
-        let rows = Rows::new(&like, &candidates.attitudes, &[0, 1, 2], 1).expect("rows");
+        let rows = AttitudeRows::new(&like, &candidates.attitudes, &[0, 1, 2], 1).expect("rows");
         let n = candidates.names.len();
         let mut least = f64::INFINITY;
         for i in 0..n.pow(k as u32) {

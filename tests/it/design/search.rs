@@ -4,8 +4,8 @@ use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, cardinal};
 use obsdeg_design::design::{
-    Candidates, Constraints, Criterion, CriterionName, DesignError, DesignOptions, Progress, Rows, Search,
-    Symmetry, design,
+    AttitudeRows, CandidateSymmetry, Candidates, Constraints, Criterion, CriterionName, DesignError,
+    DesignOptions, Progress, SequenceSearch, design,
 };
 use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::simulation::{Conditions, Plan, batch};
@@ -163,8 +163,8 @@ fn turned_schemes_are_equally_good() {
     // every sequence has an image that begins with NUE, so the best of these is the best of all
     let rows = rows_of(Carry::Inertial, &candidates);
     let evaluator = evaluator_of(Carry::Inertial, &candidates);
-    let of = |symmetry: &Symmetry| {
-        let search = Search {
+    let of = |symmetry: &CandidateSymmetry| {
+        let search = SequenceSearch {
             rows: &rows,
             walks: false,
             evaluator: &evaluator,
@@ -176,7 +176,7 @@ fn turned_schemes_are_equally_good() {
         };
         search.exhaust(symmetry, 5)
     };
-    let orbits = Symmetry { order: 4, orbit: (0..24).map(|i| i / 4).collect(), maps: Vec::new() };
+    let orbits = CandidateSymmetry { order: 4, orbit: (0..24).map(|i| i / 4).collect(), maps: Vec::new() };
     let (one, six) = (of(&rows.symmetry(&|_, _| true)), of(&orbits));
     assert_eq!(one.examined * 6, six.examined);
     assert_eq!(one.ties.total(24), six.ties.total(4));
@@ -331,7 +331,8 @@ fn no_sequence_with_slews_is_better_than_the_proven() {
     for (required, k) in [(1..2, 2), (0..3, 2), (0..3, 3)] {
         let names: Vec<String> = coefficients[required.clone()].iter().map(ToString::to_string).collect();
         let wanted: Vec<usize> = required.clone().collect();
-        let rows = Rows::new(&base(Carry::Inertial), &candidates.attitudes, &wanted, 7).expect("rows");
+        let rows =
+            AttitudeRows::new(&base(Carry::Inertial), &candidates.attitudes, &wanted, 7).expect("rows");
         // worst degree and worst sigma (deg/h) of every sequence
         let mut all: Vec<(usize, f64)> = Vec::new();
         let mut sequence = vec![0; k];

@@ -3,7 +3,7 @@
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, SlewAxis, SlewTo};
 use obsdeg_design::design::{
-    Candidates, Criterion, CriterionName, DesignError, DesignOptions, Evaluator, Limits, design,
+    Candidates, Criterion, CriterionName, DesignError, DesignOptions, Evaluator, SigmaLimits, design,
 };
 use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::compare::predicted;
@@ -70,7 +70,10 @@ fn criteria_are_those_of_the_covariance() {
             (Criterion::D, block.clone().determinant().powf(1.0 / 24.0)),
             (Criterion::E, block.clone().symmetric_eigenvalues().max().sqrt()),
             (
-                Criterion::Margin(Limits { coefficients: requirements.clone(), psi: [f64::INFINITY; 3] }),
+                Criterion::Margin(SigmaLimits {
+                    coefficients: requirements.clone(),
+                    psi: [f64::INFINITY; 3],
+                }),
                 largest(&mut sigmas.iter().zip(&requirements).map(|(s, t)| s / t)),
             ),
         ] {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
 use obsdeg_design::design::{
-    Candidates, Constraints, Criterion, CriterionName, DesignOptions, Evaluator, Search, design,
+    Candidates, Constraints, Criterion, CriterionName, DesignOptions, Evaluator, SequenceSearch, design,
 };
 use obsdeg_exact::SplitMix64;
 
@@ -33,7 +33,7 @@ fn a_pruned_search_has_one_answer_on_any_number_of_threads() {
         let candidates = Candidates::cardinals();
         let (rows, evaluator) = (rows_of(carry, &candidates), evaluator_of(carry, &candidates));
         let constraints = Constraints::default();
-        let search = Search {
+        let search = SequenceSearch {
             rows: &rows,
             evaluator: &evaluator,
             criterion: &Criterion::Worst,

@@ -2,8 +2,8 @@
 
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};
 use obsdeg_design::design::{
-    Best, Candidates, Constraints, Criterion, CriterionName, DesignError, DesignOptions, Evaluator, Rows,
-    Search, Symmetry, design,
+    AttitudeRows, Best, CandidateSymmetry, Candidates, Constraints, Criterion, CriterionName, DesignError,
+    DesignOptions, Evaluator, SequenceSearch, design,
 };
 use obsdeg_evidence::compare::predicted;
 use obsdeg_evidence::simulation::Conditions;
@@ -183,11 +183,11 @@ fn turned_schemes_are_equally_good() {
                 continue;
             }
             let like = whole(terms, carry);
-            let rows = Rows::new(&like, &candidates.attitudes, &[0, 1, 2], 1).expect("rows");
+            let rows = AttitudeRows::new(&like, &candidates.attitudes, &[0, 1, 2], 1).expect("rows");
             let evaluator =
                 Evaluator::new(&like, &candidates.attitudes, &[0, 1, 2], &quiet()).expect("an evaluator");
-            let of = |symmetry: &Symmetry| {
-                let search = Search {
+            let of = |symmetry: &CandidateSymmetry| {
+                let search = SequenceSearch {
                     rows: &rows,
                     walks: false,
                     evaluator: &evaluator,
@@ -201,7 +201,7 @@ fn turned_schemes_are_equally_good() {
             };
             let symmetry = rows.symmetry(&|i, j| (i < 3) == (j < 3));
             orders.push(symmetry.order);
-            let (some, all) = (of(&symmetry), of(&Symmetry::none(24)));
+            let (some, all) = (of(&symmetry), of(&CandidateSymmetry::none(24)));
             let best = |of: &Best| of.found.first().map(|f| f.worth.value);
             match best(&some).zip(best(&all)) {
                 Some((some, all)) => {

@@ -34,7 +34,7 @@ const CLOSE: f64 = 0.02;
 const REST: f64 = 2.0;
 
 /// Problem in SI units: information of the calibration, and that of a dwell on its drift.
-struct Dwell {
+struct BoundProblem {
     before: DMatrix<f64>,
     /// Drift in c at zero g (3 x n), and its derivatives by the components of g.
     steady: Matrix3xX<f64>,
@@ -47,25 +47,25 @@ struct Dwell {
 }
 
 /// Cell of rotations: its middle and half its edge in the coordinates of its cube, with the bound.
-struct Cell {
+struct RotationCell {
     face: usize,
     middle: [f64; 3],
     half: f64,
     bound: f64,
 }
 
-impl PartialEq for Cell {
+impl PartialEq for RotationCell {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
-impl Eq for Cell {}
-impl PartialOrd for Cell {
+impl Eq for RotationCell {}
+impl PartialOrd for RotationCell {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
-impl Ord for Cell {
+impl Ord for RotationCell {
     /// The least bound is greatest, so that a heap returns it first.
     fn cmp(&self, other: &Self) -> Ordering {
         other.bound.total_cmp(&self.bound).then_with(|| {
@@ -81,7 +81,7 @@ fn rotation(face: usize, p: [f64; 3]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]))
 }
 
-impl Cell {
+impl RotationCell {
     /// Middle of the cell, and the largest angle from it. A cap about the middle is convex in the coordinates
     /// of the cube (a central projection), so a corner is farthest.
     fn extent(&self) -> (UnitQuaternion<f64>, f64) {
@@ -102,7 +102,7 @@ impl Cell {
     }
 }
 
-impl Dwell {
+impl BoundProblem {
     /// Largest ratio of sigma to limit at an attitude and, for all attitudes within `angle` of it, a bound
     /// from below; the ratio is infinite where numbers fail.
     fn at(&self, c: &Matrix3<f64>, angle: f64) -> (f64, f64) {
@@ -154,7 +154,7 @@ impl Dwell {
         let mut best = f64::INFINITY;
         let mut count = 0;
         let examine = |(face, middle, half): (usize, [f64; 3], f64), best: &mut f64| {
-            let mut cell = Cell { face, middle, half, bound: 0.0 };
+            let mut cell = RotationCell { face, middle, half, bound: 0.0 };
             let (middle, angle) = cell.extent();
             let (worst, bound) = self.at(middle.to_rotation_matrix().matrix(), angle);
             *best = best.min(worst);
@@ -261,7 +261,7 @@ pub(super) fn bound(
     let eigen = information.symmetric_eigen();
     let roots = eigen.eigenvalues.map(|x| x.max(0.0).sqrt());
     let (steady, by_gravity) = drift_by_gravity(platform, &drift);
-    let mut dwell = Dwell {
+    let mut dwell = BoundProblem {
         before,
         steady,
         by_gravity,

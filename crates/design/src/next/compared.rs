@@ -27,7 +27,7 @@ pub(super) struct Compared<'a> {
 
 /// Extension with the values that decide its order.
 #[derive(Debug, Clone)]
-pub(super) struct Extended {
+pub(super) struct JudgedExtension {
     pub(super) sequence: Sequence,
     pub(super) positions: Vec<AddedPosition>,
     pub(super) standing: Standing,
@@ -41,12 +41,12 @@ pub(super) struct Extended {
 }
 
 /// State before the added positions.
-pub(super) struct Before {
+pub(super) struct StateBefore {
     pub(super) standing: Standing,
     pub(super) degrees: Vec<Option<usize>>,
 }
 
-impl Extended {
+impl JudgedExtension {
     pub(super) fn is_possible(&self) -> bool {
         self.possible
     }
@@ -151,11 +151,11 @@ impl Compared<'_> {
     }
 
     /// Judges an extension.
-    pub(super) fn extended(&self, sequence: &Sequence) -> Result<Extended, DesignError> {
+    pub(super) fn extended(&self, sequence: &Sequence) -> Result<JudgedExtension, DesignError> {
         self.at(sequence, self.conditions.dwell_s)
     }
 
-    fn at(&self, sequence: &Sequence, dwell_s: f64) -> Result<Extended, DesignError> {
+    fn at(&self, sequence: &Sequence, dwell_s: f64) -> Result<JudgedExtension, DesignError> {
         let (scheme, positions) = self.scheme(sequence, dwell_s);
         let attained =
             Attained::beside(&scheme, self.conditions, self.options.beforehand.as_ref(), self.options.seed)?;
@@ -165,7 +165,7 @@ impl Compared<'_> {
         let within = |found: f64, limit: Option<f64>| limit.is_none_or(|limit| found <= limit);
         let possible = within(standing.total_s, self.options.total_s) && within(longest, self.options.slew_s);
         let error_bound = attained.prediction.error_bound;
-        Ok(Extended {
+        Ok(JudgedExtension {
             sequence: sequence.clone(),
             positions,
             standing,
@@ -219,7 +219,7 @@ impl Compared<'_> {
     }
 
     /// State before the added positions; after a calibration the state given by its covariance.
-    pub(super) fn before(&self) -> Result<Option<Before>, DesignError> {
+    pub(super) fn before(&self) -> Result<Option<StateBefore>, DesignError> {
         if let Some(known) = &self.options.beforehand {
             return self.of_covariance(known).map(Some);
         }
@@ -228,11 +228,11 @@ impl Compared<'_> {
         }
         let attained = Attained::new(self.start, self.conditions, self.options.seed)?;
         let (standing, degrees, _) = self.standing(&attained)?;
-        Ok(Some(Before { standing, degrees }))
+        Ok(Some(StateBefore { standing, degrees }))
     }
 
     /// Bound over all attitudes on one more position after a calibration.
-    pub(super) fn bound(&self, first: &Extended) -> Result<Option<AttitudeBound>, DesignError> {
+    pub(super) fn bound(&self, first: &JudgedExtension) -> Result<Option<AttitudeBound>, DesignError> {
         let Some(known) = self.options.beforehand.as_ref().filter(|_| self.options.added == 1) else {
             return Ok(None);
         };
@@ -245,7 +245,7 @@ impl Compared<'_> {
     }
 
     /// State of the coefficients given by a covariance alone.
-    fn of_covariance(&self, known: &KnownCovariance) -> Result<Before, DesignError> {
+    fn of_covariance(&self, known: &KnownCovariance) -> Result<StateBefore, DesignError> {
         let platform = Platform::new(Scheme { positions: any_position(), ..self.start.clone() })?;
         let (names, units) = (platform.names(), platform.units());
         let limits = resolve("required sigma", &platform, &self.conditions.requirements, f64::NAN)?;
@@ -269,16 +269,16 @@ impl Compared<'_> {
             worst: sigmas.max_by(|a, b| a.sigma_dph.total_cmp(&b.sigma_dph)),
             total_s: 0.0,
         };
-        Ok(Before { standing, degrees: vec![None; self.required.len()] })
+        Ok(StateBefore { standing, degrees: vec![None; self.required.len()] })
     }
 
     /// Shortest dwell of an extension that meets every requirement.
-    pub(super) fn meets(&self, of: &Extended) -> Result<Option<Meeting>, DesignError> {
+    pub(super) fn meets(&self, of: &JudgedExtension) -> Result<Option<Meeting>, DesignError> {
         self.meets_within(of, LONGEST * self.conditions.dwell_s)
     }
 
     /// Shortest dwell up to `longest` that meets every requirement, in whole seconds.
-    fn meets_within(&self, of: &Extended, longest: f64) -> Result<Option<Meeting>, DesignError> {
+    fn meets_within(&self, of: &JudgedExtension, longest: f64) -> Result<Option<Meeting>, DesignError> {
         let met = |r: &Requirements| r.stated > 0 && r.all_met();
         let at = |dwell: f64| match self.at(&of.sequence, dwell) {
             // a dwell with more steps than a plan allows is not possible
@@ -309,7 +309,7 @@ impl Compared<'_> {
     /// extension is tried with dwells that make it at least a second shorter than the shortest so far.
     pub(super) fn quickest(
         &self,
-        all: &[Extended],
+        all: &[JudgedExtension],
         below: Option<f64>,
     ) -> Result<Option<Quickest>, DesignError> {
         let (mut shortest, mut best) = (below.unwrap_or(f64::INFINITY), None);

@@ -21,13 +21,13 @@ use obsdeg_exact::parallel;
 pub use answer::*;
 pub use options::NextOptions;
 
-use self::compared::{Before, Compared, Extended};
+use self::compared::{Compared, JudgedExtension, StateBefore};
 use self::options::any_position;
 use crate::design::{Candidates, DesignError, asked};
 
 /// Compared extensions, best first.
 struct Listed {
-    found: Vec<Extended>,
+    found: Vec<JudgedExtension>,
     examined: u64,
     interrupted: bool,
 }
@@ -151,16 +151,17 @@ fn listed(compared: &Compared<'_>, going: &(dyn Fn(u64, u64) -> bool + Sync)) ->
         let count = done.fetch_add(1, Ordering::Relaxed);
         if going(count, all) { compared.extended(sequence).map(Some) } else { Ok(None) }
     };
-    let judged: Vec<Option<Extended>> = parallel::try_map(sequences.len(), |i| judge(&sequences[i]))?;
+    let judged: Vec<Option<JudgedExtension>> = parallel::try_map(sequences.len(), |i| judge(&sequences[i]))?;
     let interrupted = judged.iter().any(Option::is_none);
     let examined = judged.iter().flatten().count() as u64;
-    let mut found: Vec<Extended> = judged.into_iter().flatten().filter(Extended::is_possible).collect();
-    found.sort_by(Extended::order);
+    let mut found: Vec<JudgedExtension> =
+        judged.into_iter().flatten().filter(JudgedExtension::is_possible).collect();
+    found.sort_by(JudgedExtension::order);
     Ok(Listed { found, examined, interrupted })
 }
 
 /// Best extension by each candidate, in the order of the extensions, which add one position each.
-fn by_candidate(found: &[Extended]) -> Vec<CandidateGain> {
+fn by_candidate(found: &[JudgedExtension]) -> Vec<CandidateGain> {
     let mut seen = BTreeSet::new();
     let firsts = found.iter().filter(|e| seen.insert(e.sequence[0].0));
     firsts
@@ -285,7 +286,7 @@ fn none_fits(options: &NextOptions) -> DesignError {
 }
 
 /// Extension as listed in the answer, with its changes relative to the state before.
-fn extension(e: Extended, before: Option<&Before>, required: &[String]) -> Extension {
+fn extension(e: JudgedExtension, before: Option<&StateBefore>, required: &[String]) -> Extension {
     let was = |c: usize| before.and_then(|b| b.degrees[c]);
     let was_open = |c: usize| before.is_none_or(|b| b.standing.not_observable.contains(&required[c]));
     let changed = |keep: &dyn Fn(usize, usize) -> bool| -> Vec<Resolved> {

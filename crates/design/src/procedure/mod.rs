@@ -31,7 +31,7 @@ use obsdeg_evidence::simulation::{Conditions, MeasurementReport, Plan};
 
 pub use answer::*;
 pub use options::{ProcedureError, ProcedureOptions, TILT_DEG};
-pub use rotations::{RotationError, rotation_table, scheme_of_rotations, start_of_table};
+pub use rotations::{RotationTableError, rotation_table, scheme_of_rotations, start_of_table};
 
 use self::options::check;
 use self::progress::progress;

@@ -11,7 +11,7 @@ use super::answer::{AfterPosition, CoefficientProgress};
 const MOST: usize = 100;
 
 /// State of the coefficients along the scheme.
-pub(super) struct Progress {
+pub(super) struct SchemeProgress {
     pub(super) after: Vec<AfterPosition>,
     pub(super) coefficients: Vec<CoefficientProgress>,
     pub(super) requirements: Requirements,
@@ -25,7 +25,7 @@ pub(super) fn progress(
     scheme: &Scheme,
     conditions: &Conditions,
     seed: u64,
-) -> Result<Progress, SimulationError> {
+) -> Result<SchemeProgress, SimulationError> {
     let all = scheme.positions.len();
     let first = if all > MOST { all } else { 1 };
     let judged: Vec<Attained> =
@@ -77,7 +77,7 @@ pub(super) fn progress(
         }
     });
     let after = after.collect();
-    Ok(Progress { after, coefficients, requirements })
+    Ok(SchemeProgress { after, coefficients, requirements })
 }
 
 /// Index of an unknown; `None` if it is none of the scheme.

@@ -79,7 +79,7 @@ pub fn rotation_table(rows: &[RotationRow], start_attitude_deg: [f64; 3], start:
 
 /// Defect of a rotation table.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RotationError {
+pub enum RotationTableError {
     /// A row that is not a list of 6 to 8 numbers.
     #[error(
         "line {line}: `{found}`; expected k, Ux, Uy, Uz, angle in degrees, T, T0, T1 in s (T0 and T1 may \
@@ -147,7 +147,7 @@ fn entry(text: &str) -> Option<f64> {
 
 /// Rows of a rotation table with their lines. Lines may have brackets, semicolons, and comments after `%` or
 /// `#`.
-fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationError> {
+fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationTableError> {
     let mut out = Vec::new();
     for (i, whole) in text.lines().enumerate() {
         let line = i + 1;
@@ -160,7 +160,7 @@ fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationError> {
             if cells.is_empty() || cells == ["..."] {
                 continue;
             }
-            let wrong = || RotationError::Row { line, found: row.trim().into() };
+            let wrong = || RotationTableError::Row { line, found: row.trim().into() };
             let numbers: Vec<f64> =
                 cells.iter().map(|c| entry(c)).collect::<Option<_>>().ok_or_else(wrong)?;
             let (&[number, x, y, z, angle_deg, rotate_s], rests) =
@@ -190,7 +190,7 @@ fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationError> {
             ];
             for (what, found, right, expected) in checks {
                 if !right {
-                    return Err(RotationError::Number { line, what, found, expected });
+                    return Err(RotationTableError::Number { line, what, found, expected });
                 }
             }
             let axis = [x, y, z].map(|c| c / length);
@@ -200,8 +200,8 @@ fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationError> {
     }
     let largest = out.iter().map(|(_, r): &(usize, RotationRow)| r.angle_deg.abs()).fold(0.0, f64::max);
     match out.first() {
-        None => Err(RotationError::Empty),
-        Some((line, _)) if largest < RADIANS => Err(RotationError::Radians { line: *line, largest }),
+        None => Err(RotationTableError::Empty),
+        Some((line, _)) if largest < RADIANS => Err(RotationTableError::Radians { line: *line, largest }),
         Some(_) => Ok(out),
     }
 }
@@ -210,8 +210,8 @@ fn read(text: &str) -> Result<Vec<(usize, RotationRow)>, RotationError> {
 /// rest with their dwells, and slews about the axes of the table. Angles are rounded to 1e-9 degrees.
 ///
 /// # Errors
-/// [`RotationError`] with the line.
-pub fn scheme_of_rotations(text: &str, start: &Euler) -> Result<Scheme, RotationError> {
+/// [`RotationTableError`] with the line.
+pub fn scheme_of_rotations(text: &str, start: &Euler) -> Result<Scheme, RotationTableError> {
     let rows = read(text)?;
     let mut at: Matrix3<f64> = c_n_f64(start);
     let mut positions: Vec<Position> = Scheme::of_angles([start.clone()]).positions;
@@ -219,7 +219,7 @@ pub fn scheme_of_rotations(text: &str, start: &Euler) -> Result<Scheme, Rotation
     for (k, (line, row)) in rows.iter().enumerate() {
         rest += row.before_s;
         let Some(last) = positions.last_mut().filter(|_| rest >= LEAST_S) else {
-            return Err(RotationError::NoRest { line: *line });
+            return Err(RotationTableError::NoRest { line: *line });
         };
         last.dwell = Dwell::from_seconds(rest);
         // components in the platform: X_p front, Y_p up, Z_p right
@@ -235,7 +235,7 @@ pub fn scheme_of_rotations(text: &str, start: &Euler) -> Result<Scheme, Rotation
         rest = row.after_s;
     }
     let Some(last) = positions.last_mut().filter(|_| rest >= LEAST_S) else {
-        return Err(RotationError::NoRest { line: rows.last().map_or(0, |r| r.0) });
+        return Err(RotationTableError::NoRest { line: rows.last().map_or(0, |r| r.0) });
     };
     last.dwell = Dwell::from_seconds(rest);
     Ok(Scheme { carry: Carry::Inertial, positions, ..Scheme::default() })

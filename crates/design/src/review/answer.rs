@@ -48,7 +48,7 @@ pub struct SchemeReview {
     /// Platform at each position, with the turns between positions.
     pub poses: Vec<Pose>,
     /// Gravity in platform axes over time.
-    pub attitudes: Vec<Attitude>,
+    pub attitudes: Vec<GravitySample>,
     /// One run of the filter.
     pub simulation: Simulation,
     /// Same run, sample by sample.
@@ -101,7 +101,7 @@ pub struct PositionReview {
 
 /// Gravity in platform axes at one time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Attitude {
+pub struct GravitySample {
     /// Time in s.
     pub t_s: f64,
     /// Index of the position, during a slew of the one that it goes to.

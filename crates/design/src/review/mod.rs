@@ -241,13 +241,13 @@ fn poses(scheme: &Scheme, conditions: &Conditions) -> Vec<Pose> {
 }
 
 /// Gravity along the platform axes over time.
-fn attitudes(plan: &Plan) -> Vec<Attitude> {
+fn attitudes(plan: &Plan) -> Vec<GravitySample> {
     const STEPS: usize = 24;
     let mut out = Vec::new();
     for s in &plan.segments {
         let duration = s.dt * s.steps as f64;
         let mut at = |t: f64, c: &obsdeg_core::model::Matrix3<f64>| {
-            out.push(Attitude { t_s: s.start_s + t, position: s.position, g: c[UP] });
+            out.push(GravitySample { t_s: s.start_s + t, position: s.position, g: c[UP] });
         };
         match &s.kind {
             SegmentKind::Dwell => {

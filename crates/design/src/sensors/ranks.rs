@@ -25,7 +25,7 @@ pub trait Ranks: Sync {
 /// Row with its order, the candidates that must all be in a set for the row to be present (empty: present
 /// under every set), its output, and its index among the entries of all rows.
 #[derive(Debug, Clone, Copy)]
-struct Row {
+struct ConditionalRow {
     order: usize,
     owner: Set,
     output: usize,
@@ -37,7 +37,7 @@ struct Row {
 pub struct Ordered<S: Scalars> {
     field: S,
     columns: usize,
-    rows: Vec<Row>,
+    rows: Vec<ConditionalRow>,
     entries: Vec<S::Element>,
     /// Columns of the unknowns in question.
     asked: Vec<usize>,
@@ -71,7 +71,7 @@ impl<S: Scalars> Ordered<S> {
         let mut entries = Vec::with_capacity(all.len() * point.columns);
         let mut rows = Vec::with_capacity(all.len());
         for (order, owner, output, row) in all {
-            rows.push(Row { order, owner, output, start: entries.len() });
+            rows.push(ConditionalRow { order, owner, output, start: entries.len() });
             entries.extend_from_slice(row);
         }
         let (field, columns, asked) = (point.field.clone(), point.columns, asked.to_vec());
@@ -79,7 +79,7 @@ impl<S: Scalars> Ordered<S> {
     }
 
     /// Adds the rows of a set to a space, order by order, until no more unknowns can become observable.
-    fn climb<B: Basis<S::Element>>(&self, set: Set, basis: &mut B) -> Box<[u16]> {
+    fn climb<B: GrowingSpace<S::Element>>(&self, set: Set, basis: &mut B) -> Box<[u16]> {
         let mut degrees = vec![NONE; self.asked.len()].into_boxed_slice();
         let (mut open, mut rows) = (self.asked.len(), self.rows.as_slice());
         let mut ended = vec![false; self.ending];
@@ -115,7 +115,7 @@ impl<S: Scalars> Ordered<S> {
 }
 
 /// Row space that rows are added to.
-trait Basis<E> {
+trait GrowingSpace<E> {
     /// Adds a row; true if the rank grew.
     fn add(&mut self, row: &[E]) -> bool;
     /// Ends an order. The columns whose unit vectors are in the space are known from here to the next row.
@@ -154,7 +154,7 @@ where
 /// Basis from any row space.
 struct AnyBasis<R>(R);
 
-impl<E: Copy, R: RowSpace<Element = E>> Basis<E> for AnyBasis<R> {
+impl<E: Copy, R: RowSpace<Element = E>> GrowingSpace<E> for AnyBasis<R> {
     fn add(&mut self, row: &[E]) -> bool {
         self.0.insert(row)
     }
@@ -390,7 +390,7 @@ fn combine_of<const M: usize>(f: Field, scale: u64, target: &mut [u64], terms: &
     }
 }
 
-impl Basis<u64> for Compact {
+impl GrowingSpace<u64> for Compact {
     fn add(&mut self, row: &[u64]) -> bool {
         if self.new_pivots.len() == BLOCK {
             self.update();

@@ -105,23 +105,23 @@ pub(crate) fn expression(text: &str) -> String {
 }
 
 /// Factor as LaTeX.
-struct Factor {
+struct LatexFactor {
     math: String,
     /// The same without the brackets, if the factor is a sum in brackets.
     sum: Option<String>,
 }
 
-impl Factor {
+impl LatexFactor {
     fn of(math: String) -> Self {
         Self { math, sum: None }
     }
 }
 
 /// Factors side by side; with `alone`, a sum that is the only factor has no brackets.
-fn side_by_side(factors: &[Factor], alone: bool) -> String {
+fn side_by_side(factors: &[LatexFactor], alone: bool) -> String {
     match factors {
         [] => "1".into(),
-        [Factor { sum: Some(sum), .. }] if alone => sum.clone(),
+        [LatexFactor { sum: Some(sum), .. }] if alone => sum.clone(),
         _ => {
             let mut out = String::new();
             for f in factors {
@@ -216,7 +216,7 @@ impl Reader<'_> {
         Some((negative, math))
     }
 
-    fn power(&mut self) -> Option<Factor> {
+    fn power(&mut self) -> Option<LatexFactor> {
         let (base, function) = self.primary()?;
         if self.peek() == Some('^') {
             self.rest = &self.rest[1..];
@@ -230,7 +230,7 @@ impl Reader<'_> {
         let exponent = exponent.sum.unwrap_or(exponent.math);
         let exponent = if minus { format!("-{exponent}") } else { exponent };
         let positive = exponent.chars().all(|c| c.is_ascii_digit());
-        Some(Factor::of(match function {
+        Some(LatexFactor::of(match function {
             // `f^{-1}` would mean the inverse function
             Some((name, argument)) if positive => format!("\\{name}^{{{exponent}}}({argument})"),
             Some(_) => format!("({})^{{{exponent}}}", base.math),
@@ -242,7 +242,7 @@ impl Reader<'_> {
     }
 
     /// Number, name, function or bracket; for a function also its command and argument.
-    fn primary(&mut self) -> Option<(Factor, Option<(&'static str, String)>)> {
+    fn primary(&mut self) -> Option<(LatexFactor, Option<(&'static str, String)>)> {
         let c = self.peek()?;
         if c.is_ascii_digit() || c == '.' {
             let number = self.word(|c| c.is_ascii_digit() || c == '.');
@@ -250,13 +250,13 @@ impl Reader<'_> {
             let degrees = degrees.filter(|r| !r.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_'));
             if let Some(rest) = degrees {
                 self.rest = rest;
-                return Some((Factor::of(format!("{number}^{{\\circ}}")), None));
+                return Some((LatexFactor::of(format!("{number}^{{\\circ}}")), None));
             }
-            return Some((Factor::of(number), None));
+            return Some((LatexFactor::of(number), None));
         }
         if c == '(' {
             let inner = self.bracket()?;
-            return Some((Factor { math: format!("({inner})"), sum: Some(inner) }, None));
+            return Some((LatexFactor { math: format!("({inner})"), sum: Some(inner) }, None));
         }
         if !(c.is_alphabetic() || c == '_') {
             return None;
@@ -285,18 +285,18 @@ impl Reader<'_> {
         }
         let math = dotted(&symbol(&name), primes);
         if !self.rest.starts_with('(') {
-            return Some((Factor::of(math), None));
+            return Some((LatexFactor::of(math), None));
         }
         let argument = self.bracket()?;
         if name == "sqrt" {
-            return Some((Factor::of(format!("\\sqrt{{{argument}}}")), None));
+            return Some((LatexFactor::of(format!("\\sqrt{{{argument}}}")), None));
         }
         let Some((_, command)) = FUNCTIONS.iter().find(|(known, _)| *known == name) else {
             // the value at a time, such as that at the start
             let time = argument.chars().all(|c| c.is_ascii_digit());
-            return time.then(|| (Factor::of(format!("{math}({argument})")), None));
+            return time.then(|| (LatexFactor::of(format!("{math}({argument})")), None));
         };
-        Some((Factor::of(format!("\\{command}({argument})")), Some((command, argument))))
+        Some((LatexFactor::of(format!("\\{command}({argument})")), Some((command, argument))))
     }
 
     /// `@p1`, `@"about X"[45 deg]`.

@@ -47,7 +47,7 @@ pub(super) struct Additive {
 
 /// Dual variables: a matrix X with weights of the columns. They prove a lower bound.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Dual {
+pub(super) struct DualVariables {
     /// Matrix X (m x t).
     pub(super) x: DMatrix<f64>,
     /// Weights of the terms `o_j + v_j^T M^-1 v_j`, none negative (shape t, sum 1); empty for other
@@ -75,13 +75,13 @@ impl Additive {
     /// Lower bound on the objective for all weights of sum 1, hence for every scheme; 0 if none is
     /// known. It allows for the rounding of its own evaluation; the matrices `A_i` and P count as
     /// exact.
-    pub(super) fn lower_bound(&self, dual: &Dual) -> f64 {
+    pub(super) fn lower_bound(&self, dual: &DualVariables) -> f64 {
         self.lower_bound_over(dual, 0.0)
     }
 
     /// Lower bound as [`Self::lower_bound`], with further candidates of which none adds more than
     /// `others` to `tr(X^T M X)`.
-    pub(super) fn lower_bound_over(&self, dual: &Dual, others: f64) -> f64 {
+    pub(super) fn lower_bound_over(&self, dual: &DualVariables, others: f64) -> f64 {
         let x = &dual.x;
         let (m, columns) = x.shape();
         let (w, size) = (x * x.transpose(), x.abs() * x.abs().transpose());
@@ -123,14 +123,14 @@ mod tests {
     use super::super::exact::{BallRing, Real, real};
     use super::super::weights::weigh;
     use super::*;
-    use crate::design::measure::criterion::{Criterion, Limits};
+    use crate::design::measure::criterion::{Criterion, SigmaLimits};
     use crate::design::measure::evaluator::Evaluator;
     use obsdeg_core::model::{Angle, Carry, Euler, Ring, Scheme};
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;
 
     /// Bound that an X proves, in 512 bits, for the information of the candidates in double precision.
-    fn proven(evaluator: &Evaluator, k: usize, problem: &Additive, dual: &Dual) -> Real {
+    fn proven(evaluator: &Evaluator, k: usize, problem: &Additive, dual: &DualVariables) -> Real {
         let (n, m) = (evaluator.n, problem.unknowns());
         let columns: Vec<Vec<Real>> =
             dual.x.column_iter().map(|c| c.iter().copied().map(real).collect()).collect();
@@ -201,7 +201,7 @@ mod tests {
                 .collect();
             let counting: Vec<usize> = (0..3 * terms.split(',').count() - below(2)).collect();
             let psi = if task % 2 == 0 { [f64::INFINITY; 3] } else { [0.01; 3] };
-            let limits = Limits { coefficients: vec![0.03; counting.len()], psi };
+            let limits = SigmaLimits { coefficients: vec![0.03; counting.len()], psi };
             let criteria =
                 [Criterion::Worst, Criterion::A, Criterion::D, Criterion::E, Criterion::Margin(limits)];
             let criterion = &criteria[task % 5];

@@ -19,7 +19,7 @@ use obsdeg_exact::parallel;
 
 use super::bounded::{Bounded, Bounds, rounding};
 use super::weights::{OptimalWeights, listed, weigh};
-use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::criterion::{Criterion, SigmaLimits};
 use crate::design::measure::evaluator::Evaluator;
 
 /// Step of the net of Euler angles on which attitudes to add are searched, in degrees.
@@ -67,7 +67,7 @@ impl Evaluator {
         }
         let objective = match criterion {
             Criterion::Margin(limits) => {
-                self.objective(&Criterion::Margin(Limits { psi: [f64::INFINITY; 3], ..limits.clone() }))
+                self.objective(&Criterion::Margin(SigmaLimits { psi: [f64::INFINITY; 3], ..limits.clone() }))
             }
             other => self.objective(other),
         };

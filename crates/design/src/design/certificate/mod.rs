@@ -14,7 +14,7 @@ pub use free::Everywhere;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::criterion::{Criterion, SigmaLimits};
 use crate::design::measure::evaluator::Evaluator;
 use bound::{Additive, Objective};
 use weights::{listed, weigh};
@@ -65,7 +65,7 @@ impl Evaluator {
             Criterion::Margin(limits) => self.largest(limits),
             Criterion::Worst => {
                 let d = self.n - 3 - self.nuisance;
-                self.largest(&Limits { coefficients: vec![1.0; d], psi: [f64::INFINITY; 3] })
+                self.largest(&SigmaLimits { coefficients: vec![1.0; d], psi: [f64::INFINITY; 3] })
             }
             Criterion::A => Objective::Mean(self.units()),
             Criterion::D => Objective::Volume,
@@ -80,7 +80,7 @@ impl Evaluator {
     }
 
     /// Objective: largest variance over the square of its limit.
-    fn largest(&self, limits: &Limits) -> Objective {
+    fn largest(&self, limits: &SigmaLimits) -> Objective {
         let mut vectors = self.units();
         for (mut column, limit) in vectors.column_iter_mut().zip(&limits.coefficients) {
             column /= *limit;
@@ -93,7 +93,7 @@ impl Evaluator {
     /// added. It is the least bound over `firsts`: every scheme, up to its images, contains one of them.
     fn with_psi(
         &self,
-        limits: &Limits,
+        limits: &SigmaLimits,
         k: usize,
         firsts: &[usize],
         going: &dyn Fn() -> bool,

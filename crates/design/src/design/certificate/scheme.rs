@@ -107,7 +107,7 @@ fn largest_eigenvalue_at_most(k: &DMatrix<f64>) -> Option<f64> {
 mod tests {
     use super::super::exact::{ExactInformation, square_root};
     use super::*;
-    use crate::design::measure::criterion::Limits;
+    use crate::design::measure::criterion::SigmaLimits;
     use crate::design::{Candidates, Stop};
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
     use obsdeg_evidence::simulation::Conditions;
@@ -147,7 +147,7 @@ mod tests {
             if counting.is_empty() {
                 counting.push(0);
             }
-            let limits = Limits {
+            let limits = SigmaLimits {
                 coefficients: counting.iter().map(|_| 10f64.powi(drawn(4) as i32 - 2)).collect(),
                 psi: [[0.01, 1.0, f64::INFINITY], [f64::INFINITY; 3]][drawn(2)],
             };

@@ -9,7 +9,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::bound::{Additive, Dual, Objective};
+use super::bound::{Additive, DualVariables, Objective};
 
 /// Relative gap between the objective and its bound at which the search for weights ends.
 const GAP: f64 = 1e-7;
@@ -45,7 +45,7 @@ pub(super) struct OptimalWeights {
     /// Lower bound on the objective of every scheme.
     pub(super) bound: f64,
     /// Dual variables that prove the bound; their X gives the gain of any other candidate.
-    pub(super) dual: Dual,
+    pub(super) dual: DualVariables,
 }
 
 /// Barrier function at some weights, with the Cholesky factor of the information.
@@ -309,7 +309,7 @@ impl<'a> WeightProblem<'a> {
     }
 
     /// Dual variables at the weights `w`.
-    fn dual(&self, w: &[f64], s: f64, rate: f64) -> Option<Dual> {
+    fn dual(&self, w: &[f64], s: f64, rate: f64) -> Option<DualVariables> {
         let problem = self.problem;
         let m = problem.unknowns();
         // factor of an inverse: L^-T, upper triangular
@@ -321,16 +321,16 @@ impl<'a> WeightProblem<'a> {
             Objective::Volume => {
                 let root = self.information(w).cholesky()?;
                 let x = inverse_root(&root)?.columns(problem.nuisance, problem.counting()).into_owned();
-                Some(Dual { x, shares: Vec::new() })
+                Some(DualVariables { x, shares: Vec::new() })
             }
             Objective::Least => {
-                Some(Dual { x: inverse_root(&self.reduced(w, s).cholesky()?)?, shares: Vec::new() })
+                Some(DualVariables { x: inverse_root(&self.reduced(w, s).cholesky()?)?, shares: Vec::new() })
             }
             Objective::Mean(vectors) => {
                 let share = 1.0 / vectors.ncols() as f64;
                 let root = self.information(w).cholesky()?;
                 let x = self.solved(&root).0 * share.sqrt();
-                Some(Dual { x, shares: vec![share; vectors.ncols()] })
+                Some(DualVariables { x, shares: vec![share; vectors.ncols()] })
             }
             Objective::Largest(_, offsets) => {
                 let root = self.information(w).cholesky()?;
@@ -341,7 +341,7 @@ impl<'a> WeightProblem<'a> {
                 for (j, share) in shares.iter().enumerate() {
                     x.column_mut(j).scale_mut(share.sqrt());
                 }
-                Some(Dual { x, shares })
+                Some(DualVariables { x, shares })
             }
         }
     }

@@ -8,7 +8,7 @@ use obsdeg_evidence::simulation::{Conditions, si_per_shown};
 
 use crate::design::measure::criterion::Criterion;
 use crate::design::measure::evaluator::{Dwelling, Evaluator, SequenceState};
-use crate::design::measure::omitted::{Omitted, OmittedAt, OmittedSums};
+use crate::design::measure::omitted::{OmittedAt, OmittedErrors, OmittedSums};
 use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::options::Immune;
@@ -30,7 +30,7 @@ impl Dwelling {
 impl Evaluator {
     /// Drift by the errors that are not estimated, at an attitude while the platform turns by `slew` (3
     /// x errors).
-    fn omitted_drift(&self, of: &Omitted, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
+    fn omitted_drift(&self, of: &OmittedErrors, c: &Matrix3<f64>, slew: Option<&Slew>) -> [Vec<f64>; 3] {
         let (w_n, w_u) = (self.w[1][2], -self.w[0][2]);
         let earth = earth_rate_in(&Float, c, &w_n, &w_u);
         let rate = std::array::from_fn(|i| earth[i] + slew.map_or(0.0, |s| s.rate[i]));
@@ -76,7 +76,7 @@ impl Evaluator {
 
     /// Upper bound on `O^T R^-1 O` of an error in `most` positions, by the triangle inequality: psi is
     /// at most the drift times the time plus the effect of the turns.
-    fn samples_at_most(&self, of: &Omitted, kind: usize, most: usize, conditions: &Conditions) -> f64 {
+    fn samples_at_most(&self, of: &OmittedErrors, kind: usize, most: usize, conditions: &Conditions) -> f64 {
         let dwell = self.dwells.iter().map(|d| d.seconds).fold(0.0, f64::max);
         let turn_s = conditions.slew_rate_deg_s.map_or(0.0, |rate| 360.0 / rate);
         let positions = most as f64;
@@ -116,7 +116,7 @@ impl Evaluator {
     /// Sums of one position with a psi of its own, which is eliminated.
     fn omitted_alone(
         &self,
-        of: &Omitted,
+        of: &OmittedErrors,
         c: &Matrix3<f64>,
         unknowns: &[Vec<f64>; LOCAL - 3],
         dwelling: &Dwelling,
@@ -252,7 +252,13 @@ impl Evaluator {
 
     /// Changes of the coefficients that count by one sigma of every error with a size (shape d each, in units
     /// of the evaluator), one after the other; `l` is the root of the information.
-    fn each_contribution(&self, of: &Omitted, beside: &OmittedSums, l: &[f64], mut take: impl FnMut(&[f64])) {
+    fn each_contribution(
+        &self,
+        of: &OmittedErrors,
+        beside: &OmittedSums,
+        l: &[f64],
+        mut take: impl FnMut(&[f64]),
+    ) {
         let (n, begin) = (self.n, 3 + self.nuisance);
         let first = if self.carry() == Carry::Reset { 3 } else { 0 };
         let mut y = vec![0.0; n];

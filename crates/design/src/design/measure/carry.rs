@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::{Carry, Matrix3};
 
-use crate::design::measure::evaluator::{Candidate, Dwelling, Evaluator, SequenceState};
+use crate::design::measure::evaluator::{CandidateAttitude, Dwelling, Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 
 impl Evaluator {
@@ -15,7 +15,7 @@ impl Evaluator {
         stop: Stop,
     ) -> [[f64; N]; L] {
         let (n, carry) = (self.n, self.carry());
-        let Candidate { c, effects, .. } = &self.candidates[stop.candidate];
+        let CandidateAttitude { c, effects, .. } = &self.candidates[stop.candidate];
         let turn = self.path_to(state.path.last().copied(), stop);
         let mut local = [[0.0; N]; L];
         for (row, effect) in local[3..].iter_mut().zip(&effects[..self.locals - 3]) {

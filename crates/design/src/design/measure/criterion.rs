@@ -27,12 +27,12 @@ pub enum Criterion {
     /// Largest principal sigma (E-optimal).
     E,
     /// Largest sigma over its requirement, dimensionless.
-    Margin(Limits),
+    Margin(SigmaLimits),
 }
 
 /// Largest sigmas allowed; infinite where there is no requirement.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
+pub struct SigmaLimits {
     /// Largest sigmas of the coefficients that count, in deg/h (per g) (shape d).
     pub coefficients: Vec<f64>,
     /// Largest sigmas of psi_x, psi_y, psi_z at the end, in deg; under reset carry at the end of every

@@ -13,15 +13,17 @@ use obsdeg_ekf::integrate::van_loan;
 use obsdeg_evidence::simulation::{Conditions, Plan, SimulationError, left_out, steps};
 
 use crate::design::measure::elimination::eliminate;
-use crate::design::measure::noise_process::{BiasDistribution, DwellInformation, Output, of_dwell};
-use crate::design::measure::omitted::{Omitted, OmittedAt, OmittedSums, with_accelerometer};
+use crate::design::measure::noise_process::{
+    BiasDistribution, DwellInformation, ObservedComponent, of_dwell,
+};
+use crate::design::measure::omitted::{OmittedAt, OmittedErrors, OmittedSums, with_accelerometer};
 use crate::design::measure::slew_path::SlewPath;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
 /// One candidate: its attitude, with the effects of the coefficients on drift and accelerometers there.
 #[derive(Debug, Clone)]
-pub(crate) struct Candidate {
+pub(crate) struct CandidateAttitude {
     pub(crate) c: Matrix3<f64>,
     /// `eps^n = C E(g)`, then the error of the accelerometers in `Z^n` (3 x d each), columns in the
     /// order of the evaluator; the last three are empty if no accelerometer error is unknown.
@@ -90,16 +92,16 @@ pub struct Evaluator {
     pub(crate) locals: usize,
     /// Rotation of the dynamics of psi^n: `psi' = W psi + eps`.
     pub(crate) w: Matrix3<f64>,
-    /// Dwells by `Candidate::dwell`: one for all positions, or one per candidate.
+    /// Dwells by `CandidateAttitude::dwell`: one for all positions, or one per candidate.
     pub(crate) dwells: Vec<Dwelling>,
-    pub(crate) candidates: Vec<Candidate>,
+    pub(crate) candidates: Vec<CandidateAttitude>,
     /// Slew path from candidate i to j at `i * candidates + j`; empty if repositioning takes no time.
     pub(crate) slew_paths: Vec<SlewPath>,
     pub(crate) prior: Prior,
     /// Bias process of each accelerometer beside its white noise; `None` for white noise alone.
     pub(crate) bias: Option<BiasState>,
     /// Errors that are not estimated and count in total uncertainties; `None` without such errors.
-    pub(crate) omitted: Option<Arc<Omitted>>,
+    pub(crate) omitted: Option<Arc<OmittedErrors>>,
     /// 1 deg/h in rad/s. Coefficients of other units are scaled to it: a sigma divided by it is in the
     /// unit of its coefficient.
     pub(crate) dph: f64,
@@ -143,11 +145,11 @@ impl Evaluator {
         let steps = steps(dwell_s, self.conditions.step_s)?;
         let none = DMatrix::zeros(LOCAL, LOCAL);
         let (step, _) = van_loan(&f, &none, dwell_s / steps as f64)?;
-        let outputs: Vec<Output> = local_output(&Float, self.platform.observed())
+        let outputs: Vec<ObservedComponent> = local_output(&Float, self.platform.observed())
             .into_iter()
             .map(|(component, row)| {
                 let weight = 1.0 / Plan::output_sigma(component, &self.conditions).powi(2);
-                Output { component, row, weight }
+                ObservedComponent { component, row, weight }
             })
             .collect();
         let mut now: DMatrix<f64> = DMatrix::identity(LOCAL, LOCAL);
@@ -167,11 +169,11 @@ impl Evaluator {
             if k < first {
                 continue;
             }
-            for Output { row: h, weight, .. } in &outputs {
+            for ObservedComponent { row: h, weight, .. } in &outputs {
                 let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
                 add_square(&mut local, &row, *weight);
             }
-            for (Output { weight, .. }, h) in outputs.iter().zip(&with_errors) {
+            for (ObservedComponent { weight, .. }, h) in outputs.iter().zip(&with_errors) {
                 let row: [f64; LOCAL] = std::array::from_fn(|j| (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum());
                 add_square(&mut full, &row, *weight);
             }
@@ -189,7 +191,7 @@ impl Evaluator {
 
     /// Changes the dwell of a candidate that has one of its own.
     pub(crate) fn dwell_at(&mut self, candidate: usize, dwelling: &Dwelling) {
-        let Candidate { c, effects, dwell, .. } = &self.candidates[candidate];
+        let CandidateAttitude { c, effects, dwell, .. } = &self.candidates[candidate];
         self.dwells[*dwell].clone_from(dwelling);
         let own = self.information_alone(c, effects, dwelling);
         let omitted = self.omitted_at(c, effects, dwelling);
@@ -211,7 +213,7 @@ impl Evaluator {
         self.platform.errors().drift_rows(&Float, c, rate)
     }
 
-    /// [`Candidate::effects`] of an attitude.
+    /// [`CandidateAttitude::effects`] of an attitude.
     pub(crate) fn effects(&self, c: &Matrix3<f64>) -> [Vec<f64>; LOCAL - 3] {
         let [x, y, z] = self.ordered_columns(self.drift_rows(c, None));
         let [a, b, c] = match self.platform.observed().accelerometers {
@@ -227,7 +229,7 @@ impl Evaluator {
             .iter()
             .map(|c| {
                 let effects = self.effects(c);
-                Candidate {
+                CandidateAttitude {
                     own: self.information_alone(c, &effects, &self.dwells[0]),
                     omitted: self.omitted_at(c, &effects, &self.dwells[0]),
                     effects,
@@ -242,7 +244,7 @@ impl Evaluator {
 
     /// Attitude and dwell of a candidate.
     pub(crate) fn stands(&self, candidate: usize) -> (&Matrix3<f64>, &Dwelling) {
-        let Candidate { c, dwell, .. } = &self.candidates[candidate];
+        let CandidateAttitude { c, dwell, .. } = &self.candidates[candidate];
         (c, &self.dwells[*dwell])
     }
 
@@ -322,7 +324,7 @@ impl Evaluator {
     }
 
     /// Row in SI units rearranged as by [`Self::ordered_columns`], with entries of any number type.
-    pub(crate) fn in_order<X: Copy + Mul<f64, Output = X>>(&self, row: &[X]) -> Vec<X> {
+    pub(crate) fn in_order<X: Copy + Mul<f64, ObservedComponent = X>>(&self, row: &[X]) -> Vec<X> {
         self.order.iter().zip(&self.scale).filter_map(|(&c, scale)| Some(*row.get(c)? * *scale)).collect()
     }
 

@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
-use crate::design::measure::evaluator::{Candidate, Evaluator, SequenceState};
+use crate::design::measure::evaluator::{CandidateAttitude, Evaluator, SequenceState};
 use crate::design::measure::noise_process::BiasDistribution;
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::{MAX_DRIFTS, MAX_UNKNOWNS};
@@ -80,7 +80,7 @@ impl Evaluator {
     ) {
         let n = self.n;
         let carry = self.carry();
-        let Candidate { c, own, dwell, .. } = &self.candidates[stop.candidate];
+        let CandidateAttitude { c, own, dwell, .. } = &self.candidates[stop.candidate];
         let dwelling = &self.dwells[*dwell];
         let turn = self.path_to(state.path.last().copied(), stop);
         out.path.clone_from(&state.path);

@@ -55,7 +55,7 @@ pub(crate) fn times(a: &Small<f64>, x: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
 
 /// Component of Z in n: its index, its row on the local unknowns, and the weight of a sample (1 /
 /// variance).
-pub(crate) struct Output {
+pub(crate) struct ObservedComponent {
     pub(crate) component: usize,
     pub(crate) row: [f64; LOCAL],
     pub(crate) weight: f64,
@@ -64,7 +64,7 @@ pub(crate) struct Output {
 /// Information of the samples `counted` of a dwell, `dt` s apart, where the noise of Z is correlated;
 /// `transition` is that of the local unknowns from sample to sample.
 pub(crate) fn of_dwell(
-    outputs: &[Output],
+    outputs: &[ObservedComponent],
     bias: &BiasState,
     transition: &DMatrix<f64>,
     counted: Range<usize>,
@@ -85,7 +85,7 @@ pub(crate) fn of_dwell(
             all[c][c] += 1.0 / variance;
         }
         eliminate(&mut all, STEP, if k == 0 { 0..0 } else { 0..3 });
-        for Output { component, row: h, weight } in outputs.iter().filter(|_| k >= counted.start) {
+        for ObservedComponent { component, row: h, weight } in outputs.iter().filter(|_| k >= counted.start) {
             let mut row = [0.0; STEP];
             for (j, x) in row[3..3 + LOCAL].iter_mut().enumerate() {
                 *x = (0..LOCAL).map(|i| h[i] * now[(i, j)]).sum();

@@ -18,7 +18,7 @@ use crate::design::request::options::Immune;
 
 /// Errors that count in a search.
 #[derive(Debug, Clone)]
-pub(crate) struct Omitted {
+pub(crate) struct OmittedErrors {
     /// Errors except those of attitudes, which are three more at every position.
     pub(super) model: OmittedModel,
     /// One sigma of every error in SI units, zero where none is stated; the last three are about x, y
@@ -55,7 +55,7 @@ pub(crate) struct OmittedSums {
     pub(super) psi: Vec<[f64; 3]>,
 }
 
-impl Omitted {
+impl OmittedErrors {
     /// Errors of the bench that `conditions` state, and those that schemes must be immune to. `None` if
     /// there are none, or if a search does not count them: with random drift and biases, with
     /// instantaneous turns in which torquers act, and with sizes for single attitudes.

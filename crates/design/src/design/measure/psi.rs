@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::{Carry, LOCAL, PSI_EPS};
 
-use crate::design::measure::evaluator::{Candidate, Evaluator, OwnPsi, SequenceState};
+use crate::design::measure::evaluator::{CandidateAttitude, Evaluator, OwnPsi, SequenceState};
 use crate::design::measure::stop::Stop;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
@@ -57,7 +57,7 @@ impl Evaluator {
     /// Psi in platform axes at the end of a position as a functional of psi at its start in these axes
     /// and of the coefficients (3 x n).
     fn own_psi_at_end(&self, candidate: usize) -> [Vec<f64>; 3] {
-        let Candidate { c, effects, .. } = &self.candidates[candidate];
+        let CandidateAttitude { c, effects, .. } = &self.candidates[candidate];
         let phi = &self.dwelling_of(candidate).phi;
         let entry = |r: usize, j: usize| match j.checked_sub(3) {
             None => (0..3).map(|i| phi[r][i] * c[i][j]).sum::<f64>(),

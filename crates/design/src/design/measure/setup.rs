@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::design::measure::evaluator::{Evaluator, Prior};
-use crate::design::measure::omitted::Omitted;
+use crate::design::measure::omitted::OmittedErrors;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::MAX_UNKNOWNS;
 
@@ -34,7 +34,7 @@ impl Evaluator {
     pub(crate) fn while_going(
         (base, candidates): (&Scheme, &[Euler]),
         required: &[usize],
-        (conditions, omitted): (&Conditions, Option<Omitted>),
+        (conditions, omitted): (&Conditions, Option<OmittedErrors>),
         going: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
         let scheme = Scheme {

@@ -14,7 +14,7 @@ use obsdeg_exact::certainty::{Claim, error_bound};
 use obsdeg_exact::parallel;
 use obsdeg_exact::{Echelon, Field};
 
-use crate::design::observable::symmetry::Symmetry;
+use crate::design::observable::symmetry::CandidateSymmetry;
 use crate::design::request::error::DesignError;
 
 /// Bound on the probability that a rank is wrong in all fields, which sets their number: a search
@@ -25,7 +25,7 @@ const PATIENCE: u64 = 256;
 
 /// Rows that each candidate adds, at any place of a scheme.
 #[derive(Debug, Clone)]
-pub struct Rows {
+pub struct AttitudeRows {
     /// Rows in independent random fields.
     fields: Vec<FieldRows>,
     columns: usize,
@@ -74,7 +74,7 @@ impl<'a> EnumerationLimits<'a> {
     }
 }
 
-impl Rows {
+impl AttitudeRows {
     /// Rows of `candidates` under the assumptions of `base`, in random fields that depend on `seed` and
     /// on these inputs; `required` are indices among the coefficients. Under platform and inertial
     /// carry psi is shared and the rows are those of the chain. Under reset carry psi of the position
@@ -172,11 +172,11 @@ impl Rows {
         (0..self.candidates()).filter_map(seen).collect()
     }
 
-    /// Symmetry of the candidates under turns of the platform axes; `same` as in [`Symmetry::new`].
-    pub fn symmetry(&self, same: &dyn Fn(usize, usize) -> bool) -> Symmetry {
+    /// Symmetry of the candidates under turns of the platform axes; `same` as in [`CandidateSymmetry::new`].
+    pub fn symmetry(&self, same: &dyn Fn(usize, usize) -> bool) -> CandidateSymmetry {
         let fields: Vec<(Field, &[Matrix3<u64>])> =
             self.fields.iter().map(|here| (here.field, &here.attitudes[..])).collect();
-        Symmetry::new(&fields, &self.platform, same)
+        CandidateSymmetry::new(&fields, &self.platform, same)
     }
 
     /// Lower bound on the number of positions, by counting rows.

@@ -184,7 +184,7 @@ impl TourRows {
 }
 
 /// Data of a search, shared by all its branches.
-struct SequenceSearch {
+struct SlewSequenceSearch {
     fields: [TourRows; 2],
     /// Candidates that one turn leads to, by candidate: `(turn, candidate)`.
     neighbours: Vec<Vec<(usize, usize)>>,
@@ -195,7 +195,7 @@ struct SequenceSearch {
     order: u64,
 }
 
-impl SequenceSearch {
+impl SlewSequenceSearch {
     /// Search over the candidates that a tour visits; `neighbours` are the candidates that one turn leads to.
     ///
     /// # Errors
@@ -408,7 +408,7 @@ pub fn walks(
     let platform = along_tour(base, attitudes, &tour)?;
     let all = &platform.names()[3..];
     let required = required(all, &options.required)?;
-    let space = SequenceSearch::new(&platform, &tour, &neighbours, required, options.seed)?;
+    let space = SlewSequenceSearch::new(&platform, &tour, &neighbours, required, options.seed)?;
     let whole = space.along(&tour);
     let lost = space.required.iter().filter(|c| !whole.basis.has_unit(3 + **c));
     let never: Vec<String> = lost.map(|&c| all[c].clone()).collect();

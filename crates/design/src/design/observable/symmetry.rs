@@ -13,7 +13,7 @@ use obsdeg_core::model::{Matrix3, Platform, earth_rate_in, product};
 
 /// Orbits of the candidates.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Symmetry {
+pub struct CandidateSymmetry {
     /// Number of rotations that map candidates to candidates and coefficients to equal coefficients.
     pub order: usize,
     /// Orbit of every candidate: index from 0.
@@ -22,7 +22,7 @@ pub struct Symmetry {
     pub maps: Vec<Vec<usize>>,
 }
 
-impl Symmetry {
+impl CandidateSymmetry {
     /// Symmetry of candidates given by their `C_c^n` in some fields, all of which must agree; `same(i,
     /// j)` is true if coefficients i and j are equivalent for the search.
     pub fn new(

@@ -11,7 +11,7 @@ use crate::design::nearest::Nearest;
 use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
 use crate::design::request::options::{CriterionName, DesignOptions};
-use crate::design::run::prepared::Prepared;
+use crate::design::run::prepared::PreparedSearch;
 use crate::design::search::progress::{NOTHING_YET, Progress};
 use crate::design::search::score::Scored;
 
@@ -100,7 +100,7 @@ impl AlternativeSearch<'_> {
         let candidates = candidates.unwrap_or_else(|| self.options.candidates.clone());
         let options = DesignOptions { positions: Some(k), candidates, ..self.options.clone() };
         let going = || (self.progress)(NOTHING_YET);
-        let prepared = Prepared::new(self.base, self.conditions, &options, &going)?;
+        let prepared = PreparedSearch::new(self.base, self.conditions, &options, &going)?;
         if prepared.check(k).is_err() {
             return Ok(None);
         }
@@ -121,7 +121,7 @@ impl AlternativeSearch<'_> {
     fn longer(&mut self, nearest: &Scored, k: usize) -> Result<(), DesignError> {
         let options = DesignOptions { positions: Some(k), ..self.options.clone() };
         let going = || (self.progress)(NOTHING_YET);
-        let prepared = Prepared::new(self.base, self.conditions, &options, &going)?;
+        let prepared = PreparedSearch::new(self.base, self.conditions, &options, &going)?;
         let known = self.conditions.dwell_s;
         let mut examined = 0;
         let mut tried = |dwell_s: f64| -> Result<Option<Found>, DesignError> {

@@ -13,13 +13,13 @@ use crate::design::request::error::DesignError;
 use crate::design::request::limits::PROOF;
 use crate::design::request::options::DesignOptions;
 use crate::design::run::free::Free;
-use crate::design::run::prepared::Prepared;
+use crate::design::run::prepared::PreparedSearch;
 use crate::design::run::task::{Task, asked};
 use crate::design::run::{alternatives, certify, winner};
 use crate::design::search::best::Best;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
 use crate::design::search::score::Scored;
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::SequenceSearch;
 use crate::design::search::ties::TIE;
 
 /// Finds schemes under the assumptions of `base` (its positions do not matter); `conditions` give the
@@ -39,7 +39,7 @@ pub fn design(
 
 /// Source of search results instead of a search: merged parts, with their report.
 pub(crate) type ResultSource<'a> =
-    &'a dyn Fn(&Prepared<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
+    &'a dyn Fn(&PreparedSearch<'_>, usize) -> Result<(Best, PartsReport), DesignError>;
 
 /// Answer of a design; `elsewhere` provides the results instead of a search.
 pub(crate) fn answered(
@@ -58,7 +58,7 @@ pub(crate) fn answered(
         let chosen =
             free.as_ref().map(|f| DesignOptions { candidates: f.candidates.clone(), ..options.clone() });
         let options = chosen.as_ref().unwrap_or(options);
-        let prepared = Prepared::new(base, conditions, options, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, options, &going)?;
         let (mut out, mut sets) = fewest(&prepared, stated, &going)?;
         let Some(k) = options.positions else { return Ok(out) };
         prepared.check(k)?;
@@ -106,7 +106,7 @@ pub(crate) fn answered(
 /// Answer on the fewest positions, without a search, and the number of sets that were judged. `stated` are
 /// the conditions with all requirements.
 fn fewest(
-    prepared: &Prepared<'_>,
+    prepared: &PreparedSearch<'_>,
     stated: &Conditions,
     going: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Design, f64), DesignError> {
@@ -146,10 +146,10 @@ fn fewest(
 
 /// Search for schemes of `k` positions.
 struct SchemeSearch<'a> {
-    prepared: &'a Prepared<'a>,
+    prepared: &'a PreparedSearch<'a>,
     /// Free attitudes; `None` for given candidates.
     free: Option<&'a Free>,
-    search: Search<'a>,
+    search: SequenceSearch<'a>,
     k: usize,
     /// Cancellation callback: false stops the search.
     going: &'a (dyn Fn() -> bool + Sync),

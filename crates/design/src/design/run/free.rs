@@ -17,13 +17,13 @@ use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::QUICK;
 use crate::design::request::options::DesignOptions;
-use crate::design::run::prepared::Prepared;
+use crate::design::run::prepared::PreparedSearch;
 use crate::design::run::task::Task;
 use crate::design::search::best::Best;
 use crate::design::search::progress::NOTHING_YET;
 use crate::design::search::progress::Progress;
 use crate::design::search::score::Scored;
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::SequenceSearch;
 
 /// Number of schemes by exchange that are moved, with different criteria, and number of random ones.
 const MOVED: usize = 8;
@@ -78,7 +78,7 @@ impl Free {
         if step <= 0 {
             return Err(wrong(format!("angles rounded to {} degrees", format_decimal(step))));
         }
-        let prepared = Prepared::new(base, conditions, options, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, options, &going)?;
         prepared.check(k)?;
         if prepared.evaluator.bias.is_some() {
             return Err(wrong("noise of Z that is correlated from position to position".into()));
@@ -120,9 +120,9 @@ impl Free {
     ) -> Result<(), DesignError> {
         let going = || progress(NOTHING_YET);
         let chosen = DesignOptions { candidates: self.candidates.clone(), ..options.clone() };
-        let prepared = Prepared::new(base, conditions, &chosen, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, &chosen, &going)?;
         let task = &prepared.task;
-        let search = Search { keep: options.restarts as usize, ..prepared.search(progress) };
+        let search = SequenceSearch { keep: options.restarts as usize, ..prepared.search(progress) };
         let best = search.exchange(k, &task.sequences_of(&self.starts), options.restarts, options.seed);
         self.examined += best.examined;
         let exchanged = unlike(&best.found);
@@ -162,7 +162,7 @@ impl Free {
     ) -> Result<(), DesignError> {
         let going = || progress(NOTHING_YET);
         let options = of_cardinals(options);
-        let prepared = Prepared::new(base, conditions, &options, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, &options, &going)?;
         if prepared.check(k).is_err() {
             return Ok(());
         }
@@ -182,8 +182,8 @@ impl Free {
     /// [`DesignError`].
     pub(crate) fn searched(
         &self,
-        prepared: &Prepared<'_>,
-        search: &Search<'_>,
+        prepared: &PreparedSearch<'_>,
+        search: &SequenceSearch<'_>,
         k: usize,
     ) -> Result<(Best, Option<(u64, u64)>), DesignError> {
         let task = &prepared.task;
@@ -200,7 +200,7 @@ impl Free {
             // attitudes
             let options = of_cardinals(task.options);
             let going = || (search.progress)(NOTHING_YET);
-            let cardinal = Prepared::new(task.base, prepared.conditions, &options, &going)?;
+            let cardinal = PreparedSearch::new(task.base, prepared.conditions, &options, &going)?;
             let bound = cardinal.task.bound(&cardinal.evaluator, k, &going);
             let (found, _) = cardinal.searched(&cardinal.search(search.progress), k, bound.as_ref());
             let starts: Vec<Vec<Euler>> = found.found.iter().map(|s| cardinal.task.placed(s).0).collect();

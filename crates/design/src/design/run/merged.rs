@@ -11,7 +11,7 @@ use crate::design::run::driver::answered;
 use crate::design::run::inputs::Inputs;
 use crate::design::run::part::{MOST_PARTS, Part};
 use crate::design::run::part_check::{BlockIndex, WholeSearch};
-use crate::design::run::prepared::Prepared;
+use crate::design::run::prepared::PreparedSearch;
 use crate::design::search::best::Best;
 use crate::design::search::progress::Progress;
 
@@ -38,7 +38,7 @@ pub fn design_merged(
         return Err(DesignError::Parts);
     }
     let sorted = in_order(parts, &Inputs::new(base, conditions, options))?;
-    let together = |prepared: &Prepared<'_>, k: usize| {
+    let together = |prepared: &PreparedSearch<'_>, k: usize| {
         let whole = WholeSearch::new(prepared, k, progress)?;
         for (name, part) in &sorted {
             whole.check(part).map_err(|why| DesignError::Part { name: name.clone(), why })?;

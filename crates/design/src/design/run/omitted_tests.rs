@@ -272,14 +272,14 @@ fn axes(letters: &str) -> DMatrix<f64> {
 
 /// One column of the model: psi (axis, position), `D_F` of a gyro, or `K0` of an accelerometer.
 #[derive(Clone, Copy)]
-enum Column {
+enum ModelColumn {
     Psi(usize, usize),
     Drift(usize),
     Bias(usize),
 }
 
 /// Z1 and Z3 of one column, written anew: `psi' = psi x w + eps`, by Runge and Kutta.
-fn record(column: Column, positions: &[&str], carry: Carry) -> DVector<f64> {
+fn record(column: ModelColumn, positions: &[&str], carry: Carry) -> DVector<f64> {
     let (sin, cos) = LATITUDE.to_radians().sin_cos();
     let w = DVector::from_column_slice(&[W_IE * cos, W_IE * sin, 0.0]);
     let (mut psi, mut out, mut before) = (DVector::zeros(3), Vec::new(), None);
@@ -295,10 +295,10 @@ fn record(column: Column, positions: &[&str], carry: Carry) -> DVector<f64> {
         }
         let (mut rate, mut force) = (DVector::zeros(3), DVector::zeros(3));
         match column {
-            Column::Psi(k, at) if at == i => psi += c.column(k),
-            Column::Psi(..) => {}
-            Column::Drift(k) => rate = c.column(k).into_owned(),
-            Column::Bias(k) => force = c.column(k).into_owned(),
+            ModelColumn::Psi(k, at) if at == i => psi += c.column(k),
+            ModelColumn::Psi(..) => {}
+            ModelColumn::Drift(k) => rate = c.column(k).into_owned(),
+            ModelColumn::Bias(k) => force = c.column(k).into_owned(),
         }
         let slope = |p: &DVector<f64>| p.cross(&w) + &rate;
         for _ in 0..(DWELL_S / STEP_S) as usize {
@@ -329,9 +329,9 @@ fn outside(basis: &[DVector<f64>], v: &DVector<f64>) -> DVector<f64> {
 /// of this file: 0 if none has an effect, infinite if one is in the span of the unknowns.
 fn shown_from(positions: &[&str], carry: Carry) -> f64 {
     let own = if carry == Carry::Reset { positions.len() } else { 1 };
-    let psi = (0..own).flat_map(|at| (0..3).map(move |k| Column::Psi(k, at)));
+    let psi = (0..own).flat_map(|at| (0..3).map(move |k| ModelColumn::Psi(k, at)));
     let mut basis: Vec<DVector<f64>> = Vec::new();
-    for column in psi.chain((0..3).map(Column::Drift)) {
+    for column in psi.chain((0..3).map(ModelColumn::Drift)) {
         let v = record(column, positions, carry);
         let rest = outside(&basis, &(&v / v.norm()));
         if rest.norm() > 1e-9 {
@@ -339,7 +339,7 @@ fn shown_from(positions: &[&str], carry: Carry) -> f64 {
         }
     }
     let from = |k: usize| {
-        let v = record(Column::Bias(k), positions, carry);
+        let v = record(ModelColumn::Bias(k), positions, carry);
         let rest = outside(&basis, &v).norm();
         match v.norm() {
             0.0 => 0.0,

@@ -14,11 +14,11 @@ use crate::design::measure::criterion::Criterion;
 use crate::design::measure::stop::Stop;
 use crate::design::request::error::DesignError;
 use crate::design::request::options::{CriterionName, DesignOptions};
-use crate::design::run::prepared::Prepared;
+use crate::design::run::prepared::PreparedSearch;
 use crate::design::run::task::asked;
 use crate::design::search::exhaust::SearchLevel;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::SequenceSearch;
 
 /// Name and version of the layout.
 pub const OPTIMUM_LAYOUT: &str = "obsdeg.optimum-certificate/1";
@@ -187,7 +187,7 @@ pub fn certify_optimum(
         return Err(not_covered("an answer that is not proven to be the best"));
     }
     watched(progress, |progress, _| {
-        let prepared = Prepared::new(base, conditions, options, &|| progress(NOTHING_YET))?;
+        let prepared = PreparedSearch::new(base, conditions, options, &|| progress(NOTHING_YET))?;
         let names = &prepared.task.candidates.names;
         let index = |name: &String| names.iter().position(|n| n == name).map(|i| i + 1);
         let degree = design.found.first().map_or(0, |f| f.worst_degree);
@@ -212,7 +212,7 @@ pub fn certify_optimum(
 }
 
 /// Question that the certificate answers.
-fn problem(prepared: &Prepared<'_>, k: usize) -> Result<OptimumProblem, DesignError> {
+fn problem(prepared: &PreparedSearch<'_>, k: usize) -> Result<OptimumProblem, DesignError> {
     let (task, conditions) = (&prepared.task, prepared.conditions);
     let scheme = task.base;
     let limit = |i: usize| match &task.criterion {
@@ -255,12 +255,12 @@ fn problem(prepared: &Prepared<'_>, k: usize) -> Result<OptimumProblem, DesignEr
 
 /// All blocks, with the bounds that a search of each finds.
 fn blocks(
-    prepared: &Prepared<'_>,
+    prepared: &PreparedSearch<'_>,
     (k, degree, least): (usize, usize, f64),
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Vec<SequenceBlock>, DesignError> {
     let quiet = |_: Progress| progress(NOTHING_YET);
-    let search = Search { keep: 1, ..prepared.search(&quiet) };
+    let search = SequenceSearch { keep: 1, ..prepared.search(&quiet) };
     let n = prepared.task.rows.candidates();
     let symmetry = &prepared.task.symmetry;
     let starts = starts(symmetry.representatives(), (n, k), prepared.evaluator.ordered())?;

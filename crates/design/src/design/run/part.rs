@@ -12,11 +12,11 @@ use crate::design::measure::stop::Stop;
 use crate::design::request::error::{DesignError, PartError};
 use crate::design::request::options::DesignOptions;
 use crate::design::run::inputs::{Inputs, differing, sha256};
-use crate::design::run::prepared::Prepared;
+use crate::design::run::prepared::PreparedSearch;
 use crate::design::run::task::asked;
 use crate::design::search::best::Best;
 use crate::design::search::progress::{NOTHING_YET, Progress, watched};
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::SequenceSearch;
 
 /// Name and version of the JSON layout.
 pub const PART_SCHEMA: &str = "obsdeg.part/2";
@@ -107,8 +107,8 @@ impl Part {
     /// Searches the starts of the part that are left, of `starts`, level by level; false if interrupted.
     fn searched(
         &mut self,
-        prepared: &Prepared<'_>,
-        search: &Search<'_>,
+        prepared: &PreparedSearch<'_>,
+        search: &SequenceSearch<'_>,
         k: usize,
         starts: &[Vec<Stop>],
     ) -> bool {
@@ -207,7 +207,7 @@ pub fn design_starts(
 ) -> Result<usize, DesignError> {
     let going = || true;
     let conditions = &asked(base, conditions, &options.required)?;
-    let prepared = Prepared::new(base, conditions, options, &going)?;
+    let prepared = PreparedSearch::new(base, conditions, options, &going)?;
     let k = options.positions.filter(|_| options.free.is_none()).ok_or(DesignError::Parts)?;
     Ok(prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len())
 }
@@ -243,7 +243,7 @@ pub fn design_part(
     let conditions = &asked(base, conditions, &options.required)?;
     watched(progress, |progress, _| {
         let going = || progress(NOTHING_YET);
-        let prepared = Prepared::new(base, conditions, options, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, options, &going)?;
         prepared.check(k)?;
         prepared.exhaustible(k)?;
         let search = prepared.search(progress);
@@ -289,7 +289,7 @@ mod tests {
         for (carry, candidates, k) in [(Carry::Reset, 24, 6), (Carry::Reset, 24, 7), (Carry::Inertial, 24, 5)]
         {
             let (base, conditions, options) = task(carry, candidates, k);
-            let prepared = Prepared::new(&base, &conditions, &options, &|| true).expect("a task");
+            let prepared = PreparedSearch::new(&base, &conditions, &options, &|| true).expect("a task");
             let search = prepared.search(&|_| true);
             let levels = search.levels_of(k).expect("all sets");
             let symmetry = &prepared.task.symmetry;
@@ -314,7 +314,7 @@ mod tests {
     fn a_start_is_a_bounded_amount_of_work() {
         for (carry, k) in [(Carry::Reset, 8), (Carry::Reset, 12), (Carry::Reset, 15), (Carry::Inertial, 9)] {
             let (base, conditions, options) = task(carry, 24, k);
-            let prepared = Prepared::new(&base, &conditions, &options, &|| true).expect("a task");
+            let prepared = PreparedSearch::new(&base, &conditions, &options, &|| true).expect("a task");
             let search = prepared.search(&|_| true);
             let starts = search.starts(&prepared.task.symmetry, k);
             let most = match carry {

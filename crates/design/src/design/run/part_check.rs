@@ -8,17 +8,17 @@ use obsdeg_exact::SplitMix64;
 use crate::design::measure::stop::Stop;
 use crate::design::request::error::{DesignError, PartError};
 use crate::design::run::part::{BLOCK, Block, Level, Part, range};
-use crate::design::run::prepared::Prepared;
+use crate::design::run::prepared::PreparedSearch;
 use crate::design::search::best::Best;
 use crate::design::search::exhaust::{Pruning, SearchLevel};
 use crate::design::search::progress::Progress;
 use crate::design::search::score::Scored;
-use crate::design::search::scoring::{Search, candidates};
+use crate::design::search::scoring::{SequenceSearch, candidates};
 
 /// Whole search that parts are compared with.
 pub(crate) struct WholeSearch<'a> {
-    prepared: &'a Prepared<'a>,
-    search: Search<'a>,
+    prepared: &'a PreparedSearch<'a>,
+    search: SequenceSearch<'a>,
     k: usize,
     starts: Vec<Vec<Stop>>,
     work: Vec<f64>,
@@ -36,7 +36,7 @@ impl<'a> WholeSearch<'a> {
     /// # Errors
     /// [`DesignError::Interrupted`]; [`DesignError`] where sequences are too many.
     pub(crate) fn new(
-        prepared: &'a Prepared<'a>,
+        prepared: &'a PreparedSearch<'a>,
         k: usize,
         progress: &'a (dyn Fn(Progress) -> bool + Sync),
     ) -> Result<Self, DesignError> {

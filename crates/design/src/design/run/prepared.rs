@@ -15,7 +15,7 @@ use crate::design::search::best::Best;
 use crate::design::search::exhaust::Pruning;
 use crate::design::search::progress::Progress;
 use crate::design::search::score::Scored;
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::SequenceSearch;
 use crate::design::search::screen::Screen;
 
 /// Number of schemes of least sigma that are kept, to be ranked by total uncertainty, if the search
@@ -23,7 +23,7 @@ use crate::design::search::screen::Screen;
 const RANKED: usize = 100;
 
 /// Prepared search: its task, and the evaluator of sequences.
-pub(crate) struct Prepared<'a> {
+pub(crate) struct PreparedSearch<'a> {
     pub(crate) task: Task<'a>,
     pub(crate) evaluator: Evaluator,
     pub(crate) conditions: &'a Conditions,
@@ -34,7 +34,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) beyond: Vec<String>,
 }
 
-impl<'a> Prepared<'a> {
+impl<'a> PreparedSearch<'a> {
     pub(crate) fn new(
         base: &'a Scheme,
         conditions: &'a Conditions,
@@ -63,8 +63,11 @@ impl<'a> Prepared<'a> {
         Ok(Self { task, evaluator, conditions, degrees, beyond })
     }
 
-    pub(crate) fn search<'s>(&'s self, progress: &'s (dyn Fn(Progress) -> bool + Sync)) -> Search<'s> {
-        Search {
+    pub(crate) fn search<'s>(
+        &'s self,
+        progress: &'s (dyn Fn(Progress) -> bool + Sync),
+    ) -> SequenceSearch<'s> {
+        SequenceSearch {
             rows: &self.task.rows,
             walks: self.task.walks,
             evaluator: &self.evaluator,
@@ -101,7 +104,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Bounds and incumbents for an exhaustive search; `None` if it excludes nothing.
-    pub(crate) fn pruning<'s>(&self, search: &'s Search<'_>, k: usize) -> Option<Pruning<'s>> {
+    pub(crate) fn pruning<'s>(&self, search: &'s SequenceSearch<'_>, k: usize) -> Option<Pruning<'s>> {
         let (_, sequences) = self.task.space(k, &self.evaluator)?;
         (sequences >= MANY).then(|| search.pruning(&self.task.symmetry, k, self.task.options.seed))?
     }
@@ -116,7 +119,7 @@ impl<'a> Prepared<'a> {
     /// are too many or `bound` shows that the best of an exchange are good enough.
     pub(crate) fn searched(
         &self,
-        search: &Search<'_>,
+        search: &SequenceSearch<'_>,
         k: usize,
         bound: Option<&Bound>,
     ) -> (Best, Option<(u64, u64)>) {

@@ -14,13 +14,13 @@ use obsdeg_exact::parallel;
 
 use crate::degree_caps::widest_first;
 use crate::design::answer::{Found, HalfTurn, Minimum};
-use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::criterion::{Criterion, SigmaLimits};
 use crate::design::measure::evaluator::Evaluator;
-use crate::design::measure::omitted::Omitted;
+use crate::design::measure::omitted::OmittedErrors;
 use crate::design::measure::stop::Stop;
-use crate::design::observable::rows::Rows;
+use crate::design::observable::rows::AttitudeRows;
 use crate::design::observable::slew_sequences::is_walk;
-use crate::design::observable::symmetry::Symmetry;
+use crate::design::observable::symmetry::CandidateSymmetry;
 use crate::design::polish::{divide, refine};
 use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
@@ -30,7 +30,7 @@ use crate::design::run::winner;
 use crate::design::search::best::Best;
 use crate::design::search::constraints::Constraints;
 use crate::design::search::score::Scored;
-use crate::design::search::scoring::Search;
+use crate::design::search::scoring::SequenceSearch;
 
 /// Largest number of sets for which one bit per degree is stored.
 const MOST_SETS: u64 = 5_000_000;
@@ -73,12 +73,12 @@ pub(crate) struct Task<'a> {
     pub(crate) criterion: Criterion,
     pub(crate) constraints: Constraints,
     /// Errors that are not estimated and that the search counts; `None` if it counts none.
-    pub(crate) omitted: Option<Omitted>,
+    pub(crate) omitted: Option<OmittedErrors>,
     /// Units of the errors that schemes must be immune to.
     immune_units: Vec<&'static str>,
     conditions: &'a Conditions,
-    pub(crate) rows: Rows,
-    pub(crate) symmetry: Symmetry,
+    pub(crate) rows: AttitudeRows,
+    pub(crate) symmetry: CandidateSymmetry,
     /// True if repositioning takes time.
     slews: bool,
     /// Units of all coefficients.
@@ -181,10 +181,10 @@ fn limits(
     conditions: &Conditions,
     required: &[(String, usize)],
     options: &DesignOptions,
-) -> Result<Limits, DesignError> {
+) -> Result<SigmaLimits, DesignError> {
     let limits_of = resolve("required sigma", platform, &conditions.requirements, f64::INFINITY)?;
     let first = platform.names().len() - platform.coefficients();
-    let limits = Limits {
+    let limits = SigmaLimits {
         coefficients: required.iter().map(|c| limits_of[first + c.1]).collect(),
         psi: [0, 1, 2].map(|k| limits_of[k]),
     };
@@ -197,7 +197,7 @@ fn limits(
 }
 
 /// Criterion of this name; the margin is that to the limits.
-fn criterion(name: CriterionName, limits: &Limits) -> Criterion {
+fn criterion(name: CriterionName, limits: &SigmaLimits) -> Criterion {
     match name {
         CriterionName::Worst => Criterion::Worst,
         CriterionName::A => Criterion::A,
@@ -238,7 +238,11 @@ impl Demands<'_> {
 
 /// Candidates, each attitude once, orbit by orbit, so that a set that begins with a representative stands for
 /// all its images; with their rows and their symmetry.
-fn by_orbits(candidates: &Candidates, rows: &Rows, demands: &Demands<'_>) -> (Candidates, Rows, Symmetry) {
+fn by_orbits(
+    candidates: &Candidates,
+    rows: &AttitudeRows,
+    demands: &Demands<'_>,
+) -> (Candidates, AttitudeRows, CandidateSymmetry) {
     let repeated = rows.repeated();
     let kept: Vec<usize> = (0..candidates.attitudes.len()).filter(|i| !repeated.contains(i)).collect();
     let same = |i: usize, j: usize| demands.are_alike(i, j);
@@ -252,7 +256,7 @@ fn by_orbits(candidates: &Candidates, rows: &Rows, demands: &Demands<'_>) -> (Ca
 }
 
 /// Constraints of the schemes of a task.
-fn constraints(options: &DesignOptions, limits: Limits, caps: Vec<usize>) -> Constraints {
+fn constraints(options: &DesignOptions, limits: SigmaLimits, caps: Vec<usize>) -> Constraints {
     Constraints {
         total_s: options.total_s,
         slew_s: options.slew_s,
@@ -285,14 +289,14 @@ impl<'a> Task<'a> {
         // where the number of positions is searched for, errors of single positions do not exist
         Bench::check(&conditions.bench, options.positions.unwrap_or(0), false)
             .map_err(SimulationError::from)?;
-        let omitted = Omitted::of(base, &platform, conditions, &options.immune)?;
+        let omitted = OmittedErrors::of(base, &platform, conditions, &options.immune)?;
         let omitted = omitted.filter(|_| !of_psi || conditions.bench.is_empty());
         let criterion = criterion(options.criterion, &limits);
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
         let walks = is_walk(base);
         // for slew sequences the rows only tell which attitudes are the same
         let by_sets = Scheme { carry: if walks { Carry::Platform } else { base.carry }, ..base.clone() };
-        let rows = Rows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
+        let rows = AttitudeRows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
         // a turn of the platform axes renames psi as well
         let renames = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
             && priors[..3].iter().all(|p| *p == priors[0])
@@ -316,7 +320,7 @@ impl<'a> Task<'a> {
             rows,
             symmetry,
             omitted,
-            immune_units: Omitted::units(&platform, &options.immune),
+            immune_units: OmittedErrors::units(&platform, &options.immune),
             slews: conditions.slew_rate_deg_s.is_some(),
             units: platform.units()[first..].to_vec(),
             walks,
@@ -585,7 +589,7 @@ impl<'a> Task<'a> {
     pub(crate) fn front(
         &self,
         evaluator: &Evaluator,
-        search: &Search<'_>,
+        search: &SequenceSearch<'_>,
         (k, dwell_s): (usize, f64),
         main: &Best,
     ) -> Result<Vec<Found>, DesignError> {
@@ -602,7 +606,7 @@ impl<'a> Task<'a> {
                 // a dwell of too many steps is no point of the front
                 let Ok(other) = evaluator.clone().with_dwell(dwell_s * factor) else { continue };
                 // schemes of the front are compared by their criterion alone
-                let there = Search { evaluator: &other, keep: 1, ..*search };
+                let there = SequenceSearch { evaluator: &other, keep: 1, ..*search };
                 let restarts = if count == k { FRONT_RESTARTS } else { self.options.restarts.min(40) };
                 let best = there.exchange(count, &given, restarts, self.options.seed);
                 if !best.complete {

@@ -10,7 +10,7 @@ use crate::design::measure::stop::Stop;
 use crate::design::run::task::Task;
 use crate::design::search::best::Best;
 use crate::design::search::score::Scored;
-use crate::design::search::scoring::{Search, Trial};
+use crate::design::search::scoring::{SequenceSearch, Trial};
 
 /// Factors on all sizes of the bench.
 const FACTORS: [f64; 8] = [0.0, 0.1, 0.25, 0.5, 2.0, 4.0, 10.0, 100.0];
@@ -28,7 +28,7 @@ impl Task<'_> {
     pub(crate) fn bias_front(
         &self,
         evaluator: &Evaluator,
-        search: &Search<'_>,
+        search: &SequenceSearch<'_>,
         k: usize,
         main: &Best,
     ) -> (Vec<BiasPoint>, bool) {
@@ -54,7 +54,7 @@ impl Task<'_> {
         let mut starts: Vec<Vec<Stop>> = sequences.first().cloned().into_iter().collect();
         for factor in FACTORS.into_iter().filter(|_| !all) {
             let there = Evaluator { omitted: Some(Arc::new(omitted.scaled(factor))), ..evaluator.clone() };
-            let scaled = Search { evaluator: &there, keep: 1, ..*search };
+            let scaled = SequenceSearch { evaluator: &there, keep: 1, ..*search };
             let best = scaled.exchange(k, &starts, RESTARTS, self.options.seed);
             if !best.complete {
                 return (Vec::new(), false);

@@ -2,7 +2,7 @@
 
 use obsdeg_evidence::requirements::meets;
 
-use crate::design::measure::criterion::{Criterion, Limits};
+use crate::design::measure::criterion::{Criterion, SigmaLimits};
 use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
 
@@ -14,7 +14,7 @@ pub struct Constraints {
     /// Longest turn between successive positions, in s; `None` without a limit.
     pub slew_s: Option<f64>,
     /// Largest sigmas; `None` without limits.
-    pub sigmas: Option<Limits>,
+    pub sigmas: Option<SigmaLimits>,
     /// Largest degree of every required coefficient; `None` without caps.
     pub degrees: Option<Vec<usize>>,
 }
@@ -36,7 +36,7 @@ impl Constraints {
     ) -> f64 {
         let slew = |w: &[Stop]| evaluator.slew_s(w[0].candidate, w[1].candidate);
         let slews = sequence.windows(2).map(|w| beyond(slew(w), self.slew_s)).sum::<f64>();
-        let margin = |limits: &Limits| {
+        let margin = |limits: &SigmaLimits| {
             // a margin has no unit: largest sigma over requirement
             let over = evaluator.value(state, &Criterion::Margin(limits.clone()), root);
             if meets(over, 1.0) { 0.0 } else { over - 1.0 }

@@ -7,12 +7,12 @@ use crate::design::measure::stop::Stop;
 use crate::design::search::best::Best;
 use crate::design::search::progress::{Meter, PATIENCE};
 use crate::design::search::score::{Scored, Worth};
-use crate::design::search::scoring::{Search, Trial};
+use crate::design::search::scoring::{SequenceSearch, Trial};
 
 /// Largest number of rounds of one exchange.
 const ROUNDS: usize = 50;
 
-impl Search<'_> {
+impl SequenceSearch<'_> {
     /// Stops that may stand at a place, each with the next stop by either slew path.
     fn choices(&self, now: &[Stop], place: usize) -> Vec<(Stop, Option<Stop>)> {
         let last = place.checked_sub(1).map(|p| now[p].candidate);
@@ -68,7 +68,7 @@ impl Search<'_> {
 
 /// Exchange from one start.
 struct Exchange<'a> {
-    search: &'a Search<'a>,
+    search: &'a SequenceSearch<'a>,
     meter: &'a Meter<'a>,
     /// Candidates that may stand first; `None` for all.
     firsts: Option<&'a [usize]>,
@@ -83,7 +83,7 @@ struct Exchange<'a> {
 
 impl<'a> Exchange<'a> {
     fn new(
-        search: &'a Search<'a>,
+        search: &'a SequenceSearch<'a>,
         meter: &'a Meter<'a>,
         firsts: Option<&'a [usize]>,
         now: Vec<Stop>,

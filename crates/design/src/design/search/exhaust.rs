@@ -9,12 +9,12 @@ use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
 use crate::design::observable::rows::EnumerationLimits;
 use crate::design::observable::sets::Sets;
-use crate::design::observable::symmetry::Symmetry;
+use crate::design::observable::symmetry::CandidateSymmetry;
 use crate::design::search::best::Best;
 use crate::design::search::constraints::beyond;
 use crate::design::search::progress::{Meter, PATIENCE};
 use crate::design::search::score::{Scored, Worth};
-use crate::design::search::scoring::{Search, candidates};
+use crate::design::search::scoring::{SequenceSearch, candidates};
 use crate::design::search::screen::{Scratch, Screen};
 
 /// Restarts of the exchange that finds the incumbents for pruning.
@@ -52,7 +52,7 @@ struct ActivePruning<'a> {
 
 /// Traversal of sequences that shares the states of their prefixes.
 struct Traversal<'a> {
-    search: &'a Search<'a>,
+    search: &'a SequenceSearch<'a>,
     meter: &'a Meter<'a>,
     states: Vec<SequenceState>,
     root: Vec<f64>,
@@ -68,7 +68,7 @@ struct Traversal<'a> {
 }
 
 impl<'a> Traversal<'a> {
-    fn new(search: &'a Search<'a>, meter: &'a Meter<'a>, k: usize) -> Self {
+    fn new(search: &'a SequenceSearch<'a>, meter: &'a Meter<'a>, k: usize) -> Self {
         Self {
             search,
             meter,
@@ -225,17 +225,17 @@ impl<'a> Traversal<'a> {
     }
 }
 
-impl Search<'_> {
+impl SequenceSearch<'_> {
     /// Searches all sequences of `k` candidates, with repetitions and both paths of half turns, that
     /// begin with the first candidate of an orbit (where order does not matter: that have one as their
     /// smallest). Worst degrees are searched in order until `keep` sequences are found.
-    pub fn exhaust(&self, symmetry: &Symmetry, k: usize) -> Best {
+    pub fn exhaust(&self, symmetry: &CandidateSymmetry, k: usize) -> Best {
         self.exhausted(symmetry, k, None)
     }
 
     /// Exhaustion as [`Self::exhaust`]; where order matters, sequences that a bound excludes are not
     /// evaluated. The sequences kept are the same. Incumbents come from an exchange with `seed`.
-    pub fn exhaust_pruned(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Best {
+    pub fn exhaust_pruned(&self, symmetry: &CandidateSymmetry, k: usize, seed: u64) -> Best {
         let Some(pruning) = self.pruning(symmetry, k, seed) else { return self.exhaust(symmetry, k) };
         let mut best = self.exhausted(symmetry, k, Some(&pruning));
         if !best.complete {
@@ -244,7 +244,7 @@ impl Search<'_> {
         best
     }
 
-    fn exhausted(&self, symmetry: &Symmetry, k: usize, pruning: Option<&Pruning<'_>>) -> Best {
+    fn exhausted(&self, symmetry: &CandidateSymmetry, k: usize, pruning: Option<&Pruning<'_>>) -> Best {
         let Some(levels) = self.levels_of(k) else { return Best::default() };
         let starts = self.starts(symmetry, k);
         let mut best = Best { complete: true, ..Best::default() };
@@ -258,7 +258,7 @@ impl Search<'_> {
     }
 
     /// Bounds and incumbents for a search of `k` positions; `None` if it excludes nothing.
-    pub(crate) fn pruning(&self, symmetry: &Symmetry, k: usize, seed: u64) -> Option<Pruning<'_>> {
+    pub(crate) fn pruning(&self, symmetry: &CandidateSymmetry, k: usize, seed: u64) -> Option<Pruning<'_>> {
         if k < 3 || self.keep == 0 {
             return None;
         }
@@ -278,13 +278,13 @@ impl Search<'_> {
 
     /// Starts of all sequences of an exhaustive search, in order: one or two positions, or more where
     /// too many sequences would follow.
-    pub fn starts(&self, symmetry: &Symmetry, k: usize) -> Vec<Vec<Stop>> {
+    pub fn starts(&self, symmetry: &CandidateSymmetry, k: usize) -> Vec<Vec<Stop>> {
         self.starts_of(self.depth(symmetry.representatives().len(), k), symmetry)
     }
 
     /// All sequences of `k` positions, observable or not, the first positions up to symmetry; `None` if
     /// there are more than `most`.
-    pub(crate) fn few(&self, symmetry: &Symmetry, k: usize, most: f64) -> Option<Vec<Vec<Stop>>> {
+    pub(crate) fn few(&self, symmetry: &CandidateSymmetry, k: usize, most: f64) -> Option<Vec<Vec<Stop>>> {
         let firsts = symmetry.representatives().len() as f64;
         let all = || self.starts_of(k, symmetry);
         (firsts * self.behind(k - 1) <= most && !self.walks)
@@ -302,7 +302,7 @@ impl Search<'_> {
     }
 
     /// Starts of `depth` positions.
-    pub(crate) fn starts_of(&self, depth: usize, symmetry: &Symmetry) -> Vec<Vec<Stop>> {
+    pub(crate) fn starts_of(&self, depth: usize, symmetry: &CandidateSymmetry) -> Vec<Vec<Stop>> {
         let ordered = self.evaluator.ordered();
         let longer = |start: &[Stop]| -> Vec<Vec<Stop>> {
             let last = start.last().map(|s| s.candidate);
@@ -354,7 +354,7 @@ impl Search<'_> {
     pub(crate) fn exhaust_starts(
         &self,
         starts: &[Vec<Stop>],
-        symmetry: &Symmetry,
+        symmetry: &CandidateSymmetry,
         k: usize,
         level: &SearchLevel,
         pruning: Option<&Pruning<'_>>,
@@ -405,7 +405,13 @@ impl Search<'_> {
     }
 
     /// Searches the sets behind a start, where order does not matter.
-    fn exhaust_sets(&self, meter: &Meter<'_>, start: &[Stop], k: usize, symmetry: &Symmetry) -> Best {
+    fn exhaust_sets(
+        &self,
+        meter: &Meter<'_>,
+        start: &[Stop],
+        k: usize,
+        symmetry: &CandidateSymmetry,
+    ) -> Best {
         let going = || meter.report(0, 0, None);
         let mut traversal = Traversal::new(self, meter, k);
         let mut sequence = Vec::with_capacity(k);

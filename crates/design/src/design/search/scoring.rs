@@ -3,15 +3,15 @@
 use crate::design::measure::criterion::Criterion;
 use crate::design::measure::evaluator::{Evaluator, SequenceState};
 use crate::design::measure::stop::Stop;
-use crate::design::observable::rows::Rows;
+use crate::design::observable::rows::AttitudeRows;
 use crate::design::search::constraints::Constraints;
 use crate::design::search::progress::Progress;
 use crate::design::search::score::{Scored, Worth};
 
 /// Data that all searches share.
-pub struct Search<'a> {
+pub struct SequenceSearch<'a> {
     /// Exact verdicts of sets.
-    pub rows: &'a Rows,
+    pub rows: &'a AttitudeRows,
     /// True if torquer errors act in turns. Sets have no verdict then; a sequence counts if its samples
     /// determine the required coefficients.
     pub walks: bool,
@@ -42,7 +42,7 @@ impl Trial {
     }
 }
 
-impl Search<'_> {
+impl SequenceSearch<'_> {
     /// Worst of these degrees; `None` if one is missing or beyond its cap.
     pub(crate) fn worst(&self, degrees: Vec<Option<usize>>) -> Option<usize> {
         let degrees: Vec<usize> = degrees.into_iter().collect::<Option<_>>()?;

@@ -517,7 +517,7 @@ fn inverse(root: &[f64], n: usize, out: &mut Vec<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::measure::criterion::Limits;
+    use crate::design::measure::criterion::SigmaLimits;
     use crate::design::{Candidates, SequenceState};
     use obsdeg_core::model::settings::Assignment;
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
@@ -563,7 +563,7 @@ mod tests {
             if counting.is_empty() {
                 counting.push(0);
             }
-            let limits = Limits {
+            let limits = SigmaLimits {
                 coefficients: counting.iter().map(|_| 10f64.powi(below(5) as i32 - 3)).collect(),
                 psi: [0.01, 1.0, f64::INFINITY],
             };
