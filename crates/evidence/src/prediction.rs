@@ -2,7 +2,7 @@
 
 use obsdeg_core::accuracy::{Accuracy, AccuracyError};
 use obsdeg_core::degree::{Coefficient, Findings, Status, Verdict};
-use obsdeg_core::findings::{AnalysisError, CombinationFinding, Judged};
+use obsdeg_core::findings::{AnalysisError, CombinationFinding, Judged, SchemeFindings};
 use obsdeg_core::model::Platform;
 use obsdeg_core::solution::{Frame, Sparse};
 
@@ -87,6 +87,45 @@ pub enum PredictionError {
     Accuracy(#[from] AccuracyError),
 }
 
+/// True if samples over the dwells determine a quantity: by its accuracy order if there are orders
+/// (`by_orders`), otherwise by its degree.
+fn determined(by_orders: bool, order: Option<usize>, degree: Option<usize>) -> bool {
+    if by_orders { order.is_some() } else { degree.is_some() }
+}
+
+impl PredictedUnknown {
+    /// Prediction for the unknown `c`.
+    fn of(found: &SchemeFindings, c: usize, by_orders: bool) -> Self {
+        let (Verdict { status, degree }, orders) = (found.verdicts.verdict(c), found.orders(c));
+        Self {
+            status,
+            degree,
+            accuracy_order: orders.start,
+            determined: determined(by_orders, orders.start, degree),
+            order_at_end: orders.end,
+            determined_at_end: determined(by_orders, orders.end, degree),
+            partners: found.verdicts.partners[c].clone(),
+        }
+    }
+}
+
+impl PredictedCombination {
+    /// Prediction for a combination with the coefficients `terms`.
+    fn of(c: &CombinationFinding, terms: Combination, by_orders: bool) -> Self {
+        let Verdict { status, degree } = c.verdict;
+        Self {
+            expression: c.name.clone(),
+            requested: c.requested,
+            terms,
+            status,
+            degree,
+            accuracy_order: c.orders.start,
+            order_at_end: c.orders.end,
+            determined_at_end: determined(by_orders, c.orders.end, degree),
+        }
+    }
+}
+
 impl Prediction {
     /// Prediction for `platform` with the rates `(wN, wU)` in rad/s.
     ///
@@ -100,40 +139,17 @@ impl Prediction {
             Err(AccuracyError::Rotation) => None,
             other => Some(other.map_err(Clone::clone)?),
         };
-        let determined = |order: Option<usize>, degree: Option<usize>| {
-            if accuracy.is_some() { order.is_some() } else { degree.is_some() }
-        };
         let n = platform.names().len();
-        let unknowns: Vec<PredictedUnknown> = (0..n)
-            .map(|c| {
-                let (Verdict { status, degree }, orders) = (found.verdicts.verdict(c), found.orders(c));
-                PredictedUnknown {
-                    status,
-                    degree,
-                    accuracy_order: orders.start,
-                    determined: determined(orders.start, degree),
-                    order_at_end: orders.end,
-                    determined_at_end: determined(orders.end, degree),
-                    partners: found.verdicts.partners[c].clone(),
-                }
-            })
-            .collect();
+        let by_orders = accuracy.is_some();
+        let unknowns: Vec<PredictedUnknown> =
+            (0..n).map(|c| PredictedUnknown::of(&found, c, by_orders)).collect();
         let numbers = |terms: &Sparse| -> Option<Combination> {
             let rate = |k: &Coefficient| rates[0].powi(k.rates[0]) * rates[1].powi(k.rates[1]);
             terms.iter().map(|(c, k)| Some((*c, solver.number(k)? * rate(k)))).collect()
         };
         let predicted = |c: &CombinationFinding| {
-            let Verdict { status, degree } = c.verdict;
-            Some(PredictedCombination {
-                expression: c.name.clone(),
-                requested: c.requested,
-                terms: numbers(&c.functional.as_ref()?.terms).filter(|t| !t.is_empty())?,
-                status,
-                degree,
-                accuracy_order: c.orders.start,
-                order_at_end: c.orders.end,
-                determined_at_end: determined(c.orders.end, degree),
-            })
+            let terms = numbers(&c.functional.as_ref()?.terms).filter(|t| !t.is_empty())?;
+            Some(PredictedCombination::of(c, terms, by_orders))
         };
         let combinations: Vec<PredictedCombination> =
             found.combinations.iter().filter_map(predicted).collect();
@@ -162,7 +178,7 @@ impl Prediction {
             unseen_by_derivatives,
             null_space,
             rank,
-            has_accuracy_orders: accuracy.is_some(),
+            has_accuracy_orders: by_orders,
             error_bound,
         })
     }

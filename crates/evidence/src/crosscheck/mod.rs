@@ -216,30 +216,9 @@ fn against(
         null_space: prediction.whole_null_space(),
         seed: options.seed,
     };
-    let prepared = Prepared::new(experiment)?;
-    let totals = prepared.run(options.runs, progress);
-    if totals.runs < options.runs {
-        return Err(SimulationError::Interrupted);
-    }
-    let whiteness_probability = prepared.whiteness(&totals);
-    let monte_carlo = MonteCarlo {
-        filter: prepared.filter(),
-        about_the_truth: prepared.is_about_the_truth(),
-        runs: totals.runs,
-        unsettled: totals.unsettled,
-        statistics: prepared.statistics(&totals),
-        whiteness_probability,
-        white: whiteness_probability > 1e-3,
-        history: prepared.history(&totals),
-    };
-    let controls = if options.filter.is_none() {
-        controls(scheme, conditions, prediction, options.seed)?
-    } else {
-        Vec::new()
-    };
-
-    let start = RunStart::new(truth, conditions)?;
-    let largest_psi = largest_psi(truth, conditions, &start, options.seed)?;
+    let (monte_carlo, errors) = evidence_of_runs(experiment, options.runs, progress)?;
+    let controls = controls(scheme, conditions, prediction, options)?;
+    let validity = validity(truth, conditions, options.seed)?;
     let mut out = CrossCheck {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -256,7 +235,7 @@ fn against(
         method: method().into_iter().chain([filter_method()]).collect(),
         not_tested: NOT_TESTED.map(String::from).to_vec(),
         spaces: structure.spaces,
-        ranking: ranking(&structure.quantities, prediction, &totals.errors),
+        ranking: ranking(&structure.quantities, prediction, &errors),
         slopes: structure.slopes,
         orders: Measured::count(structure.quantities.iter().map(|q| (&q.slope, q.accuracy_order.is_some()))),
         quantities: structure.quantities,
@@ -265,18 +244,59 @@ fn against(
         covariance,
         monte_carlo,
         controls,
-        validity: Validity::of(truth, conditions, &start.truth, largest_psi)?,
+        validity,
         correlation: structure.correlation,
         seed: options.seed,
         error_bound: prediction.error_bound,
     };
-    out.unresolved = unresolved(&out, structure.unresolved);
-    out.disagreements = disagreements(&out);
-    out.verdicts_agree = out.disagreements.is_empty();
-    out.disagreements.extend(misfits(&out));
-    out.passed = out.disagreements.is_empty();
-    out.counts = Counts::of(outcomes(&out));
+    conclude(&mut out, structure.unresolved);
     Ok(out)
+}
+
+/// Evidence d, and the errors of the runs.
+///
+/// # Errors
+/// [`SimulationError`]; `Interrupted` when `progress` returns false.
+fn evidence_of_runs(
+    experiment: Experiment<'_>,
+    runs: usize,
+    progress: &dyn Fn(usize) -> bool,
+) -> Result<(MonteCarlo, Vec<f64>), SimulationError> {
+    let prepared = Prepared::new(experiment)?;
+    let totals = prepared.run(runs, progress);
+    if totals.runs < runs {
+        return Err(SimulationError::Interrupted);
+    }
+    let whiteness_probability = prepared.whiteness(&totals);
+    let monte_carlo = MonteCarlo {
+        filter: prepared.filter(),
+        about_the_truth: prepared.is_about_the_truth(),
+        runs: totals.runs,
+        unsettled: totals.unsettled,
+        statistics: prepared.statistics(&totals),
+        whiteness_probability,
+        white: whiteness_probability > 1e-3,
+        history: prepared.history(&totals),
+    };
+    Ok((monte_carlo, totals.errors))
+}
+
+/// Validity of the small-angle model for the truth.
+fn validity(truth: &Plan, conditions: &Conditions, seed: u64) -> Result<Validity, SimulationError> {
+    let start = RunStart::new(truth, conditions)?;
+    let largest_psi = largest_psi(truth, conditions, &start, seed)?;
+    Validity::of(truth, conditions, &start.truth, largest_psi)
+}
+
+/// Concludes from the outcomes of all checks; `by_structure` has reasons of checks that are not resolvable.
+fn conclude(out: &mut CrossCheck, by_structure: Vec<String>) {
+    out.unresolved = unresolved(out, by_structure);
+    out.disagreements = disagreements(out);
+    out.verdicts_agree = out.disagreements.is_empty();
+    let misfits = misfits(out);
+    out.disagreements.extend(misfits);
+    out.passed = out.disagreements.is_empty();
+    out.counts = Counts::of(outcomes(out));
 }
 
 /// Conditions under which evidence b, c and f in doubles is not resolvable, in words.
@@ -352,33 +372,21 @@ fn ranking(quantities: &[QuantityEvidence], prediction: &Prediction, errors: &[f
 
 /// Evidence f: filters with another carry, at another latitude, or without a position, against the truth of
 /// the linear model. An exact truth with large drifts would add errors that hide these. Repositioning is
-/// instantaneous: a filter that does not know a position does not know its slew either.
+/// instantaneous: a filter that does not know a position does not know its slew either. There are
+/// none where the options make the filter wrong.
 fn controls(
     scheme: &Scheme,
     conditions: &Conditions,
     prediction: &Prediction,
-    seed: u64,
+    options: &CrossCheckOptions,
 ) -> Result<Vec<Control>, SimulationError> {
+    if !options.filter.is_none() {
+        return Ok(Vec::new());
+    }
+    let seed = options.seed;
     let conditions = &Conditions { slews: false, truth: Truth::Linear, ..conditions.clone() };
     let truth = Plan::new(scheme, conditions)?;
-    let other = if scheme.carry == Carry::Platform { Carry::Inertial } else { Carry::Platform };
-    // far away: a filter at a latitude close by is hardly wrong
-    let latitude = truth.platform.scheme().latitude.map_or(0.0, |l| l.degrees().abs());
-    let elsewhere: Option<Latitude> = if latitude > 45.0 { "0" } else { "90" }.parse().ok();
-    let far = elsewhere.map_or(0.0, |l| (l.degrees() - latitude).abs());
-    let apart = |i: usize, j: usize| angle_deg(&truth.attitudes[i], &truth.attitudes[j]);
-    let positions = 1..scheme.positions.len();
-    // platform and inertial carry differ by the turn of the platform; the dropped position is the one
-    // farthest from the position before it
-    let turned = positions.clone().map(|i| apart(0, i)).fold(0.0, f64::max);
-    let farthest = positions.map(|i| (i, apart(i - 1, i))).max_by(|a, b| a.1.total_cmp(&b.1));
-    let changes = [
-        Some((FilterChange { carry: Some(other), ..FilterChange::default() }, turned))
-            .filter(|_| farthest.is_some()),
-        Some((FilterChange { latitude: elsewhere, ..FilterChange::default() }, far)),
-        farthest.map(|(i, off)| (FilterChange { dropped: Some(i), ..FilterChange::default() }, off)),
-    ];
-    let changes: Vec<(FilterChange, f64)> = changes.into_iter().flatten().collect();
+    let changes = control_changes(scheme, &truth);
     let counted = parallel::map(changes.len(), |i| -> Result<(usize, usize), SimulationError> {
         let change = &changes[i].0;
         let filter_scheme = change.apply(scheme);
@@ -402,31 +410,63 @@ fn controls(
         if filter.stages == truth.stages {
             continue;
         }
-        let (failed, checks) = counts?;
+        let name = format!("filter {}", change.words(scheme));
         let experiment = Experiment { filter: &filter, truth: &truth, conditions, null_space: None, seed };
-        let prepared = Prepared::new(experiment)?;
-        let by_data = |runs| prepared.statistics(&prepared.run(runs, &|_| true)).pop();
-        let Some(mut nis) = by_data(CONTROL_RUNS) else { continue };
-        if failed == 0 && nis.pass {
-            nis = by_data(MANY_RUNS).unwrap_or(nis);
-        }
-        out.push(Control {
-            name: format!("filter {}", change.words(scheme)),
-            failed,
-            checks,
-            nis: nis.measured,
-            band: nis.wide_band,
-            off_deg: *off_deg,
-            outcome: match failed > 0 || !nis.pass {
-                true => Agreement::Agrees,
-                false if *off_deg < OFF_DEG || !must_show(&truth, &filter, conditions)? => {
-                    Agreement::NotResolvable
-                }
-                false => Agreement::Disagrees,
-            },
-        });
+        out.extend(control(name, *off_deg, counts?, experiment)?);
     }
     Ok(out)
+}
+
+/// Wrong filters of the controls, with the size of each change in deg.
+fn control_changes(scheme: &Scheme, truth: &Plan) -> Vec<(FilterChange, f64)> {
+    let other = if scheme.carry == Carry::Platform { Carry::Inertial } else { Carry::Platform };
+    // far away: a filter at a latitude close by is hardly wrong
+    let latitude = truth.platform.scheme().latitude.map_or(0.0, |l| l.degrees().abs());
+    let elsewhere: Option<Latitude> = if latitude > 45.0 { "0" } else { "90" }.parse().ok();
+    let far = elsewhere.map_or(0.0, |l| (l.degrees() - latitude).abs());
+    let apart = |i: usize, j: usize| angle_deg(&truth.attitudes[i], &truth.attitudes[j]);
+    let positions = 1..scheme.positions.len();
+    // platform and inertial carry differ by the turn of the platform; the dropped position is the one
+    // farthest from the position before it
+    let turned = positions.clone().map(|i| apart(0, i)).fold(0.0, f64::max);
+    let farthest = positions.map(|i| (i, apart(i - 1, i))).max_by(|a, b| a.1.total_cmp(&b.1));
+    let changes = [
+        Some((FilterChange { carry: Some(other), ..FilterChange::default() }, turned))
+            .filter(|_| farthest.is_some()),
+        Some((FilterChange { latitude: elsewhere, ..FilterChange::default() }, far)),
+        farthest.map(|(i, off)| (FilterChange { dropped: Some(i), ..FilterChange::default() }, off)),
+    ];
+    changes.into_iter().flatten().collect()
+}
+
+/// Control by a wrong filter, of whose checks `failed` out of `checks` fail; `None` without a statistic of its
+/// innovations.
+fn control(
+    name: String,
+    off_deg: f64,
+    (failed, checks): (usize, usize),
+    experiment: Experiment<'_>,
+) -> Result<Option<Control>, SimulationError> {
+    let Experiment { truth, filter, conditions, .. } = experiment;
+    let prepared = Prepared::new(experiment)?;
+    let by_data = |runs| prepared.statistics(&prepared.run(runs, &|_| true)).pop();
+    let Some(mut nis) = by_data(CONTROL_RUNS) else { return Ok(None) };
+    if failed == 0 && nis.pass {
+        nis = by_data(MANY_RUNS).unwrap_or(nis);
+    }
+    Ok(Some(Control {
+        name,
+        failed,
+        checks,
+        nis: nis.measured,
+        band: nis.wide_band,
+        off_deg,
+        outcome: match failed > 0 || !nis.pass {
+            true => Agreement::Agrees,
+            false if off_deg < OFF_DEG || !must_show(truth, filter, conditions)? => Agreement::NotResolvable,
+            false => Agreement::Disagrees,
+        },
+    }))
 }
 
 /// True if the innovations of a wrong filter must reveal it in [`MANY_RUNS`]: by the part of the drawn truths

@@ -289,15 +289,7 @@ impl<'a> Prepared<'a> {
         for run in from..to {
             let mut noise = Noise::new(*seed, run as u64 + 1);
             x.copy_from_slice(&self.start.estimate);
-            if self.is_about_the_truth() {
-                self.draw_about_the_truth(&mut noise, &mut drawn, &mut x);
-            } else {
-                for ((x, mean), sigma) in
-                    drawn.iter_mut().zip(&self.truth_start.estimate).zip(&self.truth_start.sigma)
-                {
-                    *x = mean + sigma * noise.normal();
-                }
-            }
+            self.draw(&mut noise, &mut drawn, &mut x);
             truth.reset(&drawn);
             whitened.clear();
             let mut next = 0;
@@ -327,19 +319,38 @@ impl<'a> Prepared<'a> {
                 },
             )
             .expect("gains and states are those of the filter's stages");
-            if let (true, Some((basis, nees))) = (comparable, &self.observable) {
-                let truth = truth.borrow();
-                let true_x = || truth.x().iter().chain(std::iter::repeat(&0.0));
-                let errors = || x.iter().zip(true_x()).map(|(a, b)| a - b);
-                let mut projected: Vec<f64> =
-                    basis.column_iter().map(|c| c.iter().zip(errors()).map(|(a, e)| a * e).sum()).collect();
-                totals.nees_observable += nees.of(&mut projected).unwrap_or(f64::NAN);
+            if comparable {
+                totals.nees_observable += self.nees_observable(&x, truth.borrow().x());
             }
             totals.correlate(&whitened, filter.components.len());
             totals.largest_psi = totals.largest_psi.max(truth.borrow().largest_psi);
             totals.runs += 1;
         }
         totals
+    }
+
+    /// Draws the truth of a run of the linear filter: about its first estimate, or as
+    /// [`Self::draw_about_the_truth`] does with an initial estimate.
+    fn draw(&self, noise: &mut Noise, truth: &mut [f64], estimate: &mut [f64]) {
+        if self.is_about_the_truth() {
+            return self.draw_about_the_truth(noise, truth, estimate);
+        }
+        for ((x, mean), sigma) in
+            truth.iter_mut().zip(&self.truth_start.estimate).zip(&self.truth_start.sigma)
+        {
+            *x = mean + sigma * noise.normal();
+        }
+    }
+
+    /// NEES of the observable subspace for the estimate `x` at the end, where the true states are `truth`; zero
+    /// without such a subspace.
+    fn nees_observable(&self, x: &[f64], truth: &[f64]) -> f64 {
+        let Some((basis, nees)) = &self.observable else { return 0.0 };
+        // a truth without biases has zeros in their place
+        let errors = || x.iter().zip(truth.iter().chain(std::iter::repeat(&0.0))).map(|(a, b)| a - b);
+        let mut projected: Vec<f64> =
+            basis.column_iter().map(|c| c.iter().zip(errors()).map(|(a, e)| a * e).sum()).collect();
+        nees.of(&mut projected).unwrap_or(f64::NAN)
     }
 
     /// Number of samples of Z per run.

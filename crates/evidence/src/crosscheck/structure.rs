@@ -297,6 +297,53 @@ pub(super) fn last_covariance(
     Ok(obsdeg_ekf::linear::last_covariance(&plan.stages, start.covariance(form)?)?)
 }
 
+/// Verdict on a quantity, an unknown or a combination.
+#[derive(Clone, Copy)]
+struct QuantityVerdict {
+    status: Status,
+    degree: Option<usize>,
+    /// Accuracy orders of the values at the start and at the end.
+    orders: [Option<usize>; 2],
+    determined_at_end: bool,
+    /// True if the coefficients are exact: those of unknowns, not those of combinations.
+    exact: bool,
+}
+
+/// Verdicts on the unknowns, then on the combinations.
+fn verdicts(prediction: &Prediction) -> impl Iterator<Item = QuantityVerdict> + '_ {
+    let unknowns = prediction.unknowns.iter().map(|u| QuantityVerdict {
+        status: u.status,
+        degree: u.degree,
+        orders: [u.accuracy_order, u.order_at_end],
+        determined_at_end: u.determined_at_end,
+        exact: true,
+    });
+    unknowns.chain(prediction.combinations.iter().map(|c| QuantityVerdict {
+        status: c.status,
+        degree: c.degree,
+        orders: [c.accuracy_order, c.order_at_end],
+        determined_at_end: c.determined_at_end,
+        exact: false,
+    }))
+}
+
+impl QuantityVerdict {
+    /// Check of an order against a slope. The coefficients of a combination are doubles, so a rest of it below
+    /// 2^-46 counts as rounding; the contribution of the dwells, as small as the dwell, is then lost too, and
+    /// the slope is that of the degree.
+    fn slope(&self, order: Option<usize>, modelled: bool, dwell_slope: Option<DwellSlope>) -> Check {
+        let check = slope(order, modelled, dwell_slope);
+        let hides = !self.exact && self.degree.is_some_and(|degree| order.is_none_or(|order| order > degree));
+        let of_degree = rules::slope(self.degree, check.measured).outcome == Agreement::Agrees;
+        if check.fails() && hides && of_degree {
+            return Check { outcome: Agreement::NotResolvable, ..check };
+        }
+        check
+    }
+}
+
+/// Evidence on the unknowns and combinations; `ratios` are the factors of the inflation of those that the
+/// filter has.
 fn quantities(
     truth: &Plan,
     names: &[String],
@@ -305,70 +352,48 @@ fn quantities(
     shown: &DwellLimit,
     ratios: &[f64],
 ) -> Vec<QuantityEvidence> {
-    let n = truth.unknowns();
-    let unknowns = prediction.unknowns.iter();
-    let unknowns =
-        unknowns.map(|u| (u.status, u.degree, [u.accuracy_order, u.order_at_end], u.determined_at_end));
-    let combinations = prediction.combinations.iter();
-    let combinations =
-        combinations.map(|c| (c.status, c.degree, [c.accuracy_order, c.order_at_end], c.determined_at_end));
-    let comparable = functionals[..n].iter().all(Option::is_some);
+    let comparable = functionals[..truth.unknowns()].iter().all(Option::is_some);
     let seen = shown.derivatives.as_ref().map(|a| &a.seen);
     let partners = seen.filter(|_| comparable).map(spaces::partners);
     let mut measured = ratios.iter().enumerate();
-    names
-        .iter()
-        .zip(unknowns.chain(combinations))
-        .zip(functionals)
-        .enumerate()
-        .map(|(c, ((name, (status, degree, orders, at_end)), functional))| {
-            let found = functional.as_ref().and_then(|f| Some((f, measured.next()?)));
-            let dwell_slopes = found.map_or([None; 3], |(_, (i, _))| shown.dwell_slopes(i));
-            let modelled = functional.is_some();
-            let status_measured = found.and_then(|(f, _)| {
-                let excited = f.iter().any(|(c, _)| seen.is_some_and(|s| s.excited[*c]));
-                match dwell_slopes[0]? {
-                    DwellSlope::Slope(_) => Some(Status::Observable),
-                    DwellSlope::Unseen => Some(Status::of(None, excited)),
-                    DwellSlope::Bends => None,
-                }
-            });
-            let status_outcome = match (modelled, status_measured) {
-                (_, Some(found)) => Agreement::of(found == status),
-                (true, None) => Agreement::NotResolvable,
-                (false, None) => Agreement::NotTested,
-            };
-            let named = |u: &PredictedUnknown| {
-                let found = partners.as_ref().map(|p| p[c].as_slice());
-                spaces::named(&u.partners, found, truth.platform.names())
-            };
-            // the coefficients of a combination are doubles, so a rest of it below 2^-46 counts as rounding;
-            // the contribution of the dwells, as small as the dwell, is then lost too, and the slope is that
-            // of the degree
-            let rounded = |check: Check, order: Option<usize>| {
-                let hides = c >= n && degree.is_some_and(|degree| order.is_none_or(|order| order > degree));
-                let of_degree = rules::slope(degree, check.measured).outcome == Agreement::Agrees;
-                if check.fails() && hides && of_degree {
-                    return Check { outcome: Agreement::NotResolvable, ..check };
-                }
-                check
-            };
-            QuantityEvidence {
-                name: name.clone(),
-                status,
-                degree,
-                accuracy_order: orders[0],
-                modelled,
-                degree_slope: slope(degree, modelled, dwell_slopes[0]),
-                status_measured,
-                status_outcome,
-                partners: prediction.unknowns.get(c).filter(|_| comparable).map(named),
-                slope: rounded(slope(orders[0], modelled, dwell_slopes[1]), orders[0]),
-                slope_at_end: rounded(slope(orders[1], modelled, dwell_slopes[2]), orders[1]),
-                inflation: rules::LINEAR.check(at_end, found.map(|(_, (_, ratio))| *ratio)),
+    let all = names.iter().zip(verdicts(prediction)).zip(functionals).enumerate();
+    all.map(|(c, ((name, verdict), functional))| {
+        let found = functional.as_ref().and_then(|f| Some((f, measured.next()?)));
+        let dwell_slopes = found.map_or([None; 3], |(_, (i, _))| shown.dwell_slopes(i));
+        let modelled = functional.is_some();
+        let status_measured = found.and_then(|(f, _)| {
+            let excited = f.iter().any(|(c, _)| seen.is_some_and(|s| s.excited[*c]));
+            match dwell_slopes[0]? {
+                DwellSlope::Slope(_) => Some(Status::Observable),
+                DwellSlope::Unseen => Some(Status::of(None, excited)),
+                DwellSlope::Bends => None,
             }
-        })
-        .collect()
+        });
+        let status_outcome = match (modelled, status_measured) {
+            (_, Some(found)) => Agreement::of(found == verdict.status),
+            (true, None) => Agreement::NotResolvable,
+            (false, None) => Agreement::NotTested,
+        };
+        let named = |u: &PredictedUnknown| {
+            let found = partners.as_ref().map(|p| p[c].as_slice());
+            spaces::named(&u.partners, found, truth.platform.names())
+        };
+        QuantityEvidence {
+            name: name.clone(),
+            status: verdict.status,
+            degree: verdict.degree,
+            accuracy_order: verdict.orders[0],
+            modelled,
+            degree_slope: slope(verdict.degree, modelled, dwell_slopes[0]),
+            status_measured,
+            status_outcome,
+            partners: prediction.unknowns.get(c).filter(|_| comparable).map(named),
+            slope: verdict.slope(verdict.orders[0], modelled, dwell_slopes[1]),
+            slope_at_end: verdict.slope(verdict.orders[1], modelled, dwell_slopes[2]),
+            inflation: rules::LINEAR.check(verdict.determined_at_end, found.map(|(_, (_, ratio))| *ratio)),
+        }
+    })
+    .collect()
 }
 
 /// Direction unobservable from Z by the verdicts.
@@ -378,6 +403,58 @@ struct Direction {
     weakest: Option<([usize; 2], f64)>,
     /// Largest part of the direction that rounding of the model may make observable, dimensionless.
     rounding: f64,
+}
+
+/// Information of all samples of the filter, by columns of unit length, so that units do not matter.
+struct ScaledInformation {
+    root: DMatrix<f64>,
+    /// Lengths of the columns. The rest that cosines of right angles leave of a column counts as zero.
+    norms: Vec<f64>,
+    /// Length of the longest column of the same kind (rates or not), by unknown.
+    largest_of_kind: Vec<f64>,
+    /// Singular values, and the largest of them.
+    values: Vec<f64>,
+    largest: f64,
+}
+
+impl ScaledInformation {
+    fn of(filter: &Plan) -> Result<Self, SimulationError> {
+        let n = filter.unknowns();
+        let root = batch(filter, SquareRootInformation::none(n))?.information;
+        let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
+        let units = filter.platform.units();
+        let largest_of = |unit: &&str| {
+            let own = lengths.iter().zip(units).filter(|(_, u)| is_rate(u) == is_rate(unit));
+            own.map(|(x, _)| *x).fold(0.0, f64::max)
+        };
+        let largest_of_kind: Vec<f64> = units.iter().map(largest_of).collect();
+        let norm = |(x, most): (&f64, &f64)| match *most {
+            0.0 => 1.0,
+            most if *x <= NOTHING * most => most,
+            _ => *x,
+        };
+        let norms: Vec<f64> = lengths.iter().zip(&largest_of_kind).map(norm).collect();
+        let root = DMatrix::from_fn(n, n, |i, j| root.root()[(i, j)] / norms[j]);
+        let (values, _) = singular_values(&root)?;
+        let largest = values.first().copied().unwrap_or(1.0);
+        Ok(Self { root, norms, largest_of_kind, values, largest })
+    }
+
+    /// Information along a direction, relative to the largest.
+    fn seen_along(&self, vector: &Combination) -> f64 {
+        let mut v = nalgebra::DVector::zeros(self.norms.len());
+        for &(c, x) in vector {
+            v[c] = x * self.norms[c];
+        }
+        (&self.root * &v).norm() / (v.norm() * self.largest)
+    }
+
+    /// Largest part of a direction that rounding of the model may make observable, in units of rounding.
+    fn rounding_along(&self, vector: &Combination) -> f64 {
+        let moved = |&(c, x): &(usize, f64)| (x * self.largest_of_kind[c]).abs();
+        let size = vector.iter().map(|&(c, x)| (x * self.norms[c]).powi(2)).sum::<f64>().sqrt();
+        vector.iter().map(moved).sum::<f64>() / (size * self.largest)
+    }
 }
 
 /// Evidence on the unobservable directions: the predicted null vectors against the information, and their
@@ -390,69 +467,59 @@ fn null_evidence(
     correlation: &DMatrix<f64>,
 ) -> Result<(Vec<Direction>, Count), SimulationError> {
     let n = filter.unknowns();
-    let root = batch(filter, SquareRootInformation::none(n))?.information;
-    // columns of unit length, so that units do not matter; the rest that cosines of right angles leave of a
-    // column counts as zero
-    let lengths: Vec<f64> = root.root().column_iter().map(|c| c.norm()).collect();
-    let units = filter.platform.units();
-    let largest_of = |unit: &str| {
-        let own = lengths.iter().zip(units).filter(|(_, u)| is_rate(u) == is_rate(unit));
-        own.map(|(x, _)| *x).fold(0.0, f64::max)
-    };
-    let norm = |(x, unit): (&f64, &&str)| match largest_of(unit) {
-        0.0 => 1.0,
-        most if *x <= NOTHING * most => most,
-        _ => *x,
-    };
-    let norms: Vec<f64> = lengths.iter().zip(units).map(norm).collect();
-    let scaled = DMatrix::from_fn(n, n, |i, j| root.root()[(i, j)] / norms[j]);
-    let (values, _) = singular_values(&scaled)?;
-    let largest = values.first().copied().unwrap_or(1.0);
+    let information = ScaledInformation::of(filter)?;
     let predicted = truth.unknowns() - prediction.rank;
     let defect = match shown.rank() {
         Some(rank) => Count { predicted, measured: n - rank, outcome: Agreement::of(predicted == n - rank) },
         // doubles may lose a hardly observable direction
-        None => Count { outcome: Agreement::NotResolvable, ..rules::defect(predicted, &values, UNSEEN) },
+        None => {
+            let defect = rules::defect(predicted, &information.values, UNSEEN);
+            Count { outcome: Agreement::NotResolvable, ..defect }
+        }
     };
-    let mut evidence = Vec::new();
-    for (k, vector) in prediction.null_space.iter().enumerate() {
-        let names = truth.platform.names();
+    let names = truth.platform.names();
+    let comparable = names == filter.platform.names();
+    let direction = |(k, vector): (usize, &Combination)| {
         let parts: Vec<String> =
             vector.iter().map(|(c, x)| format!("{} = {}", names[*c], short(*x))).collect();
-        let comparable = names == filter.platform.names();
-        let seen = comparable.then(|| {
-            let mut v = nalgebra::DVector::zeros(n);
-            for &(c, x) in vector {
-                v[c] = x * norms[c];
-            }
-            (&scaled * &v).norm() / (v.norm() * largest)
-        });
-        // shared unknowns are known only where all null vectors are
-        let shares = |other: &Combination| other.iter().any(|(c, _)| vector.iter().any(|(d, _)| c == d));
-        let alone = prediction
-            .whole_null_space()
-            .is_some_and(|all| all.iter().enumerate().all(|(i, other)| i == k || !shares(other)));
-        let parts_of = if comparable && alone { vector.as_slice() } else { &[] };
-        let pairs = parts_of.iter().enumerate().flat_map(|(i, a)| parts_of[..i].iter().map(move |b| (a, b)));
-        let signed = pairs.map(|(a, b)| (([a.0, b.0], (a.1 * b.1).signum()), correlation[(a.0, b.0)]));
-        // NaN stays
-        let weakest = signed
-            .map(|((pair, sign), x)| ((pair, sign), x * sign))
-            .reduce(|a, b| if b.1 >= a.1 || a.1.is_nan() { a } else { b });
-        let moved = |&(c, x): &(usize, f64)| (x * largest_of(units[c])).abs();
-        let size = |v: &Combination| v.iter().map(|&(c, x)| (x * norms[c]).powi(2)).sum::<f64>().sqrt();
-        let part = |v: &Combination| v.iter().map(moved).sum::<f64>() / (size(v) * largest);
-        evidence.push(Direction {
+        let seen = comparable.then(|| information.seen_along(vector));
+        let alone = comparable && shares_nothing(prediction, k);
+        let weakest = weakest_correlation(if alone { vector.as_slice() } else { &[] }, correlation);
+        let rounding = f64::from(ROUNDING).exp2();
+        Direction {
             weakest: weakest.map(|w| w.0),
-            rounding: if comparable { f64::from(ROUNDING).exp2() * part(vector) } else { 0.0 },
+            rounding: if comparable { rounding * information.rounding_along(vector) } else { 0.0 },
             evidence: NullEvidence {
                 direction: parts.join(", "),
                 seen: Check::new(0.0, seen, |s| s <= UNSEEN),
                 correlation: weakest.map(|(_, x)| Check::new(1.0, Some(x), |x| x > 0.999)),
             },
-        });
-    }
-    Ok((evidence, defect))
+        }
+    };
+    Ok((prediction.null_space.iter().enumerate().map(direction).collect(), defect))
+}
+
+/// True if the null vector `k` shares no unknown with another. Shared unknowns are known only where all null
+/// vectors are.
+fn shares_nothing(prediction: &Prediction, k: usize) -> bool {
+    let vector = &prediction.null_space[k];
+    let shares = |other: &Combination| other.iter().any(|(c, _)| vector.iter().any(|(d, _)| c == d));
+    prediction
+        .whole_null_space()
+        .is_some_and(|all| all.iter().enumerate().all(|(i, other)| i == k || !shares(other)))
+}
+
+/// Two unknowns of a null vector and the sign of their correlation, where that is least in size, and its size.
+fn weakest_correlation(
+    vector: &[(usize, f64)],
+    correlation: &DMatrix<f64>,
+) -> Option<(([usize; 2], f64), f64)> {
+    let pairs = vector.iter().enumerate().flat_map(|(i, a)| vector[..i].iter().map(move |b| (a, b)));
+    let signed = pairs.map(|(a, b)| (([a.0, b.0], (a.1 * b.1).signum()), correlation[(a.0, b.0)]));
+    // NaN stays
+    signed
+        .map(|((pair, sign), x)| ((pair, sign), x * sign))
+        .reduce(|a, b| if b.1 >= a.1 || a.1.is_nan() { a } else { b })
 }
 
 /// Number in few digits.

@@ -57,31 +57,7 @@ impl SecondOrderTerms {
         let weights: Vec<f64> = (0..at.outputs.len()).map(weight).collect();
         let least = SEEN / weights.iter().map(|w| w * w).sum::<f64>().sqrt();
         let directions = directions(stages, p, prior, filter.plan().constants(), least);
-        let path = |directions: &[(f64, &Vec<f64>)]| -> Result<Vec<f64>, EkfError> {
-            let mut delta = vec![0.0; x0.dimension()];
-            for (by, direction) in directions {
-                delta.iter_mut().zip(*direction).for_each(|(x, d)| *x += by * d);
-            }
-            let mut x = x0.clone();
-            x.retract(&delta);
-            let there = Trajectory::new(filter, x)?;
-            let outputs = there.outputs.iter().zip(&at.outputs).map(|(a, b)| a - b);
-            Ok(outputs.chain(there.states.iter().zip(&at.states).flat_map(|(a, b)| a.local(b))).collect())
-        };
-        let ahead = directions.iter().map(|s| path(&[(1.0, s)])).collect::<Result<Vec<_>, _>>()?;
-        let (mut mean, mut columns) =
-            (vec![0.0; at.outputs.len() + at.states.len() * x0.dimension()], Vec::new());
-        for (i, s) in directions.iter().enumerate() {
-            let back = path(&[(-1.0, s)])?;
-            let twice: Vec<f64> = ahead[i].iter().zip(&back).map(|(a, b)| a + b).collect();
-            mean.iter_mut().zip(&twice).for_each(|(m, x)| *m += x / 2.0);
-            columns.push(twice.iter().map(|x| x / f64::sqrt(2.0)).collect::<Vec<f64>>());
-            for (j, other) in directions[..i].iter().enumerate() {
-                let mut both = path(&[(1.0, s), (1.0, other)])?;
-                both.iter_mut().zip(ahead[i].iter().zip(&ahead[j])).for_each(|(x, (a, b))| *x -= a + b);
-                columns.push(both);
-            }
-        }
+        let (mean, columns) = second_differences(filter, x0, at, &directions)?;
         if columns.is_empty() {
             return Ok(None);
         }
@@ -154,6 +130,42 @@ impl SecondOrderTerms {
         let p = &to * p.matrix() * to.transpose();
         Ok((x.as_slice().to_vec(), Covariance::new("P", &((&p + p.transpose()) / 2.0), Form::Ud)?))
     }
+}
+
+/// Second differences along `directions` of the outputs of a run, then of its states, about the trajectory `at`
+/// from `x0`: those of the mean, and a column for each direction and each pair.
+fn second_differences(
+    filter: &Extended<'_>,
+    x0: &PlatformState,
+    at: &Trajectory,
+    directions: &[Vec<f64>],
+) -> Result<(Vec<f64>, Vec<Vec<f64>>), EkfError> {
+    let path = |directions: &[(f64, &Vec<f64>)]| -> Result<Vec<f64>, EkfError> {
+        let mut delta = vec![0.0; x0.dimension()];
+        for (by, direction) in directions {
+            delta.iter_mut().zip(*direction).for_each(|(x, d)| *x += by * d);
+        }
+        let mut x = x0.clone();
+        x.retract(&delta);
+        let there = Trajectory::new(filter, x)?;
+        let outputs = there.outputs.iter().zip(&at.outputs).map(|(a, b)| a - b);
+        Ok(outputs.chain(there.states.iter().zip(&at.states).flat_map(|(a, b)| a.local(b))).collect())
+    };
+    let ahead = directions.iter().map(|s| path(&[(1.0, s)])).collect::<Result<Vec<_>, _>>()?;
+    let (mut mean, mut columns) =
+        (vec![0.0; at.outputs.len() + at.states.len() * x0.dimension()], Vec::new());
+    for (i, s) in directions.iter().enumerate() {
+        let back = path(&[(-1.0, s)])?;
+        let twice: Vec<f64> = ahead[i].iter().zip(&back).map(|(a, b)| a + b).collect();
+        mean.iter_mut().zip(&twice).for_each(|(m, x)| *m += x / 2.0);
+        columns.push(twice.iter().map(|x| x / f64::sqrt(2.0)).collect::<Vec<f64>>());
+        for (j, other) in directions[..i].iter().enumerate() {
+            let mut both = path(&[(1.0, s), (1.0, other)])?;
+            both.iter_mut().zip(ahead[i].iter().zip(&ahead[j])).for_each(|(x, (a, b))| *x -= a + b);
+            columns.push(both);
+        }
+    }
+    Ok((mean, columns))
 }
 
 /// Directions of the likely starts, each one standard deviation long, that turn the platform by angles whose

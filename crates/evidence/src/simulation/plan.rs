@@ -289,43 +289,19 @@ impl Plan {
             .collect()
     }
 
+    /// Linear model of a segment, and the root of its noise.
     fn stage(
         &self,
         segment: usize,
         conditions: &Conditions,
     ) -> Result<(Stage, DMatrix<f64>), SimulationError> {
         let s = &self.segments[segment];
-        let held = conditions.drift_noise.held_rad_s(s.dt);
-        let block = &self.blocks[s.position];
-        let n = self.unknowns();
-        let process = PlatformProcess { plan: self, segment };
-        let (phi, q) = match &s.kind {
-            SegmentKind::Dwell => {
-                let phi = match conditions.propagation {
-                    Propagation::Exponential => self.exponential(block, s.dt),
-                    Propagation::Rk4 => {
-                        runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi
-                    }
-                };
-                (phi, self.held_noise(block, s.dt, held))
-            }
-            SegmentKind::Rotation(_) => {
-                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi;
-                (phi, self.held_noise(block, s.dt, held))
-            }
-            SegmentKind::Slew(_) => {
-                let phi = runge_kutta(&process, 0.0, &DVector::zeros(n), s.dt, self.substeps(segment))?.phi;
-                // noise of a slew: that of the steps of a position of the same duration
-                let dt = conditions.step_s.min(s.dt);
-                let held = conditions.drift_noise.held_rad_s(dt);
-                let q = self.held_noise(block, dt, held).map(|row| row.map(|x| x * s.dt / dt));
-                (phi, q)
-            }
-        };
-        let states = self.states();
+        let (n, states) = (self.unknowns(), self.states());
+        let phi = self.psi_transition(segment, conditions)?;
+        let q = self.psi_noise(s, conditions);
         let mut phi = phi.resize(states, states, 0.0);
         let mut q = DMatrix::from_fn(3, 3, |i, j| q[i][j]).resize(3 + states - n, 3 + states - n, 0.0);
-        let moved: Vec<usize> = block.columns[..3].iter().copied().chain(n..states).collect();
+        let moved: Vec<usize> = self.psi_columns(segment).iter().copied().chain(n..states).collect();
         if self.is_noisy() {
             let (own, noise) = self.bias_step(segment)?;
             q += noise;
@@ -341,24 +317,7 @@ impl Plan {
                 full[(r, c)] = q[(i, j)];
             }
         }
-        let outputs = match s.kind {
-            _ if s.left_out => Vec::new(),
-            SegmentKind::Slew(_) => Vec::new(),
-            SegmentKind::Dwell | SegmentKind::Rotation(_) => self
-                .output_rows(segment)
-                .into_iter()
-                .zip(&self.components)
-                .map(|(mut h, &c)| {
-                    // biases of the accelerometers are in platform axes
-                    if c != AZIMUTH {
-                        let attitude = self.attitude(segment, s.dt);
-                        let entry = |(k, axis, _): (usize, usize, &Bias)| (n + k, attitude[c - 1][axis]);
-                        h.extend(self.accelerometer_biases().map(entry).filter(|(_, x)| *x != 0.0));
-                    }
-                    ScalarOutput { h, r: Self::output_sigma(c, conditions).powi(2) }
-                })
-                .collect(),
-        };
+        let outputs = self.outputs(segment, conditions);
         let stage = Stage {
             transition: Transition::new(&phi)?,
             noise: ProcessNoise::new(&full)?,
@@ -366,6 +325,56 @@ impl Plan {
             steps: s.steps,
         };
         Ok((stage, root(&q)))
+    }
+
+    /// Transition of the unknowns over a step of a segment.
+    fn psi_transition(
+        &self,
+        segment: usize,
+        conditions: &Conditions,
+    ) -> Result<DMatrix<f64>, SimulationError> {
+        let s = &self.segments[segment];
+        if s.kind == SegmentKind::Dwell && conditions.propagation == Propagation::Exponential {
+            return Ok(self.exponential(&self.blocks[s.position], s.dt));
+        }
+        let process = PlatformProcess { plan: self, segment };
+        let start = DVector::zeros(self.unknowns());
+        Ok(runge_kutta(&process, 0.0, &start, s.dt, self.substeps(segment))?.phi)
+    }
+
+    /// Covariance of psi from the random drift of a step of a segment; that of a slew is the one of the steps
+    /// of a position of the same duration.
+    fn psi_noise(&self, s: &Segment, conditions: &Conditions) -> Matrix3<f64> {
+        let block = &self.blocks[s.position];
+        match &s.kind {
+            SegmentKind::Dwell | SegmentKind::Rotation(_) => {
+                self.held_noise(block, s.dt, conditions.drift_noise.held_rad_s(s.dt))
+            }
+            SegmentKind::Slew(_) => {
+                let dt = conditions.step_s.min(s.dt);
+                let held = conditions.drift_noise.held_rad_s(dt);
+                self.held_noise(block, dt, held).map(|row| row.map(|x| x * s.dt / dt))
+            }
+        }
+    }
+
+    /// Outputs at the end of a step of a segment; none while samples are left out.
+    fn outputs(&self, segment: usize, conditions: &Conditions) -> Vec<ScalarOutput> {
+        let s = &self.segments[segment];
+        if s.left_out || matches!(s.kind, SegmentKind::Slew(_)) {
+            return Vec::new();
+        }
+        let n = self.unknowns();
+        let output = |(mut h, &c): (Vec<(usize, f64)>, &usize)| {
+            // biases of the accelerometers are in platform axes
+            if c != AZIMUTH {
+                let attitude = self.attitude(segment, s.dt);
+                let entry = |(k, axis, _): (usize, usize, &Bias)| (n + k, attitude[c - 1][axis]);
+                h.extend(self.accelerometer_biases().map(entry).filter(|(_, x)| *x != 0.0));
+            }
+            ScalarOutput { h, r: Self::output_sigma(c, conditions).powi(2) }
+        };
+        self.output_rows(segment).into_iter().zip(&self.components).map(output).collect()
     }
 
     /// Transition Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by
@@ -468,6 +477,81 @@ fn slews(
     Ok(slew.map_err(|_| misses())?.into_iter().collect())
 }
 
+/// Timeline under construction, with the counts that are limited.
+#[derive(Default)]
+struct Timeline {
+    segments: Vec<Segment>,
+    /// End of the last segment, in s.
+    end_s: f64,
+    /// Numbers of steps, of steps of rotating segments, and of integration steps.
+    all: f64,
+    turning: f64,
+    integration: f64,
+}
+
+impl Timeline {
+    /// Adds a segment of `steps` equal steps.
+    fn push(&mut self, position: usize, kind: SegmentKind, duration: f64, steps: usize, left_out: bool) {
+        let dt = duration / steps as f64;
+        self.segments.push(Segment { position, kind, start_s: self.end_s, steps, dt, left_out });
+        self.end_s += duration;
+    }
+
+    /// Adds a slew to a position.
+    fn slew(&mut self, position: usize, slew: Slew) -> Result<(), SimulationError> {
+        let duration = slew.duration_s;
+        self.all += 1.0;
+        self.integration += slew.turned(duration) / MAX_TURN;
+        counted("integration steps", self.integration, MAX_INTEGRATION)?;
+        self.push(position, SegmentKind::Slew(slew), duration, 1, false);
+        Ok(())
+    }
+
+    /// Counts the steps of a position before they are made.
+    fn count(&mut self, steps: usize, unknowns: usize) -> Result<(), SimulationError> {
+        self.all += steps as f64;
+        counted("steps", self.all, MAX_STEPS)?;
+        counted("steps times unknowns", self.all * unknowns as f64, MAX_NUMBERS)?;
+        Ok(())
+    }
+
+    /// Adds a position at rest. Samples of its first `settle_s` s are left out.
+    fn rest(
+        &mut self,
+        (position, name): (usize, &str),
+        dwell: f64,
+        steps: usize,
+        settle_s: f64,
+    ) -> Result<(), SimulationError> {
+        let dt = dwell / steps as f64;
+        let first = left_out(settle_s, dt);
+        if first >= steps {
+            return Err(SimulationError::Settle { settle_s, place: format!("`{name}`"), dwell_s: dwell });
+        }
+        let waited = dt * first as f64;
+        if first > 0 {
+            self.push(position, SegmentKind::Dwell, waited, first, true);
+        }
+        self.push(position, SegmentKind::Dwell, dwell - waited, steps - first, false);
+        Ok(())
+    }
+
+    /// Adds a rotating position, step by step.
+    fn rotation(&mut self, position: usize, whole: &Slew, steps: usize) -> Result<(), SimulationError> {
+        let (dwell, dt) = (whole.duration_s, whole.duration_s / steps as f64);
+        self.turning += steps as f64;
+        self.integration += whole.turned(dwell) / MAX_TURN;
+        counted("steps of rotating segments", self.turning, MAX_TURNING_STEPS)?;
+        counted("integration steps", self.integration, MAX_INTEGRATION)?;
+        for k in 0..steps {
+            let from = whole.at(k as f64 * dt);
+            let step = Slew { from, duration_s: dt, ..whole.clone() };
+            self.push(position, SegmentKind::Rotation(step), dt, 1, false);
+        }
+        Ok(())
+    }
+}
+
 /// Segments of positions and slews in order; numbers of steps are checked before they are made.
 fn timeline(
     scheme: &Scheme,
@@ -476,63 +560,22 @@ fn timeline(
     attitudes: &[Matrix3<f64>],
     ends: &[Matrix3<f64>],
 ) -> Result<Vec<Segment>, SimulationError> {
-    let mut segments: Vec<Segment> = Vec::new();
-    let mut start_s = 0.0;
-    let mut push = |position, kind, duration: f64, steps: usize, left_out| {
-        let dt = duration / steps as f64;
-        segments.push(Segment { position, kind, start_s, steps, dt, left_out });
-        start_s += duration;
-    };
-    let (mut all, mut turning, mut integration) = (0.0, 0.0, 0.0);
+    let mut out = Timeline::default();
     for (position, p) in scheme.positions.iter().enumerate() {
         if let (Some(rate), true) = (conditions.slew_rate(p), position > 0) {
             for slew in slews(scheme, position, attitudes, ends, rate.to_radians())? {
-                let duration = slew.duration_s;
-                all += 1.0;
-                integration += slew.turned(duration) / MAX_TURN;
-                counted("integration steps", integration, MAX_INTEGRATION)?;
-                push(position, SegmentKind::Slew(slew), duration, 1, false);
+                out.slew(position, slew)?;
             }
         }
         let dwell = p.dwell.map_or(conditions.dwell_s, |d| d.seconds());
         let steps = steps(dwell, conditions.step_s)?;
-        all += steps as f64;
-        counted("steps", all, MAX_STEPS)?;
-        counted("steps times unknowns", all * unknowns as f64, MAX_NUMBERS)?;
-        let dt = dwell / steps as f64;
+        out.count(steps, unknowns)?;
         match p.rotation.as_ref() {
-            None => {
-                let first = left_out(conditions.settle_s, dt);
-                if first >= steps {
-                    let (settle_s, place) = (conditions.settle_s, format!("`{}`", p.name));
-                    return Err(SimulationError::Settle { settle_s, place, dwell_s: dwell });
-                }
-                let waited = dt * first as f64;
-                if first > 0 {
-                    push(position, SegmentKind::Dwell, waited, first, true);
-                }
-                push(position, SegmentKind::Dwell, dwell - waited, steps - first, false);
-            }
-            Some(r) => {
-                let whole = Slew::about(&attitudes[position], r, dwell);
-                turning += steps as f64;
-                integration += whole.turned(dwell) / MAX_TURN;
-                counted("steps of rotating segments", turning, MAX_TURNING_STEPS)?;
-                counted("integration steps", integration, MAX_INTEGRATION)?;
-                for k in 0..steps {
-                    let from = whole.at(k as f64 * dt);
-                    push(
-                        position,
-                        SegmentKind::Rotation(Slew { from, duration_s: dt, ..whole.clone() }),
-                        dt,
-                        1,
-                        false,
-                    );
-                }
-            }
+            None => out.rest((position, p.name.as_str()), dwell, steps, conditions.settle_s)?,
+            Some(r) => out.rotation(position, &Slew::about(&attitudes[position], r, dwell), steps)?,
         }
     }
-    Ok(segments)
+    Ok(out.segments)
 }
 
 /// Linear model of one segment as a process: `psi' = psi x omega + eps` in the axes of the unknowns.

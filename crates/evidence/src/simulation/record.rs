@@ -266,25 +266,8 @@ fn extended(
     Ok(FilterSeries { estimate, sigma, whitened, covariance, error, passes: (passes, converged) })
 }
 
-/// Runs the filter of `plan` against one truth with randomly drawn biases. The conditions select the filter,
-/// or the validity of the small-angle model does. Where it is not the linear one, the linear filter also runs
-/// on the same measurements.
-///
-/// # Errors
-/// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact
-/// truth that turns too fast, [`SimulationError::Unresolvable`] for a number that is not finite.
-pub fn run(
-    plan: &Plan,
-    conditions: &Conditions,
-    start: &RunStart,
-    prediction: &Prediction,
-    seed: u64,
-) -> Result<Record, SimulationError> {
-    let n = plan.unknowns();
-    let recorded = RecordedQuantities {
-        unknowns: n,
-        combinations: prediction.combinations.iter().map(|c| &c.terms[..]).collect(),
-    };
+/// Traces of a run with names, units and times, without series.
+fn empty_traces(plan: &Plan, prediction: &Prediction) -> Traces {
     let mut traces = Traces {
         names: plan.platform.names().to_vec(),
         time_unit: "s".into(),
@@ -307,6 +290,41 @@ pub fn run(
             traces.position.push(segment.position);
         }
     }
+    traces
+}
+
+/// Checks that all numbers of a run are finite.
+fn check_finite(sampled: &SampledTruth, filtered: &FilterSeries) -> Result<(), SimulationError> {
+    let finite = |list: &[f64]| list.iter().all(|x| x.is_finite());
+    let all = |lists: &[Vec<f64>]| lists.iter().all(|l| finite(l));
+    let ended = finite(&filtered.whitened) && finite(&filtered.error) && all(&sampled.truth);
+    if ended && all(&filtered.estimate) && all(&filtered.sigma) {
+        return Ok(());
+    }
+    let what = "the run of the filter ends in numbers that are none".into();
+    Err(SimulationError::Unresolvable { what })
+}
+
+/// Runs the filter of `plan` against one truth with randomly drawn biases. The conditions select the filter,
+/// or the validity of the small-angle model does. Where it is not the linear one, the linear filter also runs
+/// on the same measurements.
+///
+/// # Errors
+/// [`SimulationError::Filter`] when the prior is refused, [`SimulationError::TooManySteps`] for an exact
+/// truth that turns too fast, [`SimulationError::Unresolvable`] for a number that is not finite.
+pub fn run(
+    plan: &Plan,
+    conditions: &Conditions,
+    start: &RunStart,
+    prediction: &Prediction,
+    seed: u64,
+) -> Result<Record, SimulationError> {
+    let n = plan.unknowns();
+    let recorded = RecordedQuantities {
+        unknowns: n,
+        combinations: prediction.combinations.iter().map(|c| &c.terms[..]).collect(),
+    };
+    let mut traces = empty_traces(plan, prediction);
     let sampled = sampled(plan, conditions, start, &recorded, seed)?;
     let validity = Validity::of(plan, conditions, &start.truth, sampled.largest_psi)?;
     let (kind, reason) = choose(plan, conditions, &validity)?;
@@ -315,13 +333,7 @@ pub fn run(
         FilterKind::Extended => extended(plan, conditions, start, &sampled, &recorded, false)?,
         FilterKind::Iterated => extended(plan, conditions, start, &sampled, &recorded, true)?,
     };
-    let finite = |list: &[f64]| list.iter().all(|x| x.is_finite());
-    let all = |lists: &[Vec<f64>]| lists.iter().all(|l| finite(l));
-    let ended = finite(&filtered.whitened) && finite(&filtered.error) && all(&sampled.truth);
-    if !(ended && all(&filtered.estimate) && all(&filtered.sigma)) {
-        let what = "the run of the filter ends in numbers that are none".into();
-        return Err(SimulationError::Unresolvable { what });
-    }
+    check_finite(&sampled, &filtered)?;
     let series = |filtered: FilterSeries| -> Vec<Series> {
         let both = filtered.estimate.into_iter().zip(filtered.sigma).zip(&sampled.truth);
         both.map(|((estimate, sigma), truth)| Series { truth: truth.clone(), estimate, sigma }).collect()

@@ -48,34 +48,11 @@ fn summary(
     bench: &DMatrix<f64>,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
-    let n = plan.unknowns();
-    let (names, units) = (plan.platform.names(), plan.platform.units());
     let requirements = resolve(REQUIRED, &plan.platform, &conditions.requirements, f64::NAN)?;
-    let required = |c: usize| Some(requirements[c]).filter(|r| !r.is_nan());
     let attained = Attained::new(scheme, conditions, seed)?;
-    let unknowns = prediction.unknowns.iter().enumerate().map(|(c, u)| {
-        let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
-        let wanted = [required(c), attained.sigmas[c]];
-        let bench = added_to(bench, &[(c, 1.0)]) / si_per_shown(units[c]);
-        estimate(&names[c], units[c], verdict, (c, record), wanted, bench)
-    });
-    let mut quantities: Vec<Estimate> = unknowns.collect();
-    for (q, u) in
-        quantities.iter_mut().zip(&prediction.unknowns).filter(|(q, _)| q.outcome == Outcome::PriorOnly)
-    {
-        let unseen = u.partners.iter().filter(|&&p| !prediction.unknowns[p].determined_at_end);
-        q.prior_of = unseen.map(|&p| names[p].clone()).collect();
-    }
-    let combination = |(i, c): (usize, &PredictedCombination)| -> Result<Estimate, SimulationError> {
-        let verdict = (c.status, c.degree, c.accuracy_order, c.determined_at_end);
-        let lead = c.terms[0].0;
-        let predicted = attained.sigma_of(&c.terms)? / si_per_shown(units[lead]);
-        let wanted = [required(lead), c.determined_at_end.then_some(predicted)];
-        let bench = added_to(bench, &c.terms) / si_per_shown(units[lead]);
-        Ok(estimate(&c.expression, units[lead], verdict, (n + i, record), wanted, bench))
-    };
-    let combinations = prediction.combinations.iter().enumerate();
-    let combinations: Vec<Estimate> = combinations.map(combination).collect::<Result<_, _>>()?;
+    let estimates = RunEstimates { plan, prediction, record, bench, requirements, attained: &attained };
+    let quantities = estimates.unknowns();
+    let combinations = estimates.combinations()?;
     let consistency = Consistency::of(Outcomes {
         whitened: &record.whitened,
         outputs: plan.components.len(),
@@ -105,6 +82,60 @@ fn summary(
         gimbals: scheme.gimbal_report(),
         seed,
     })
+}
+
+/// Estimates of a run, with the required and the predicted sigmas.
+struct RunEstimates<'a> {
+    plan: &'a Plan,
+    prediction: &'a Prediction,
+    record: &'a Record,
+    /// Contributions of a bench.
+    bench: &'a DMatrix<f64>,
+    /// Required sigma by unknown; NaN where none is stated.
+    requirements: Vec<f64>,
+    attained: &'a Attained,
+}
+
+impl RunEstimates<'_> {
+    /// Required sigma of the unknown `c`.
+    fn required(&self, c: usize) -> Option<f64> {
+        Some(self.requirements[c]).filter(|r| !r.is_nan())
+    }
+
+    /// Estimates of the unknowns.
+    fn unknowns(&self) -> Vec<Estimate> {
+        let (names, units) = (self.plan.platform.names(), self.plan.platform.units());
+        let unknowns = self.prediction.unknowns.iter().enumerate().map(|(c, u)| {
+            let verdict = (u.status, u.degree, u.accuracy_order, u.determined_at_end);
+            let wanted = [self.required(c), self.attained.sigmas[c]];
+            let bench = added_to(self.bench, &[(c, 1.0)]) / si_per_shown(units[c]);
+            estimate(&names[c], units[c], verdict, (c, self.record), wanted, bench)
+        });
+        let mut out: Vec<Estimate> = unknowns.collect();
+        let predicted = &self.prediction.unknowns;
+        for (q, u) in out.iter_mut().zip(predicted).filter(|(q, _)| q.outcome == Outcome::PriorOnly) {
+            let unseen = u.partners.iter().filter(|&&p| !predicted[p].determined_at_end);
+            q.prior_of = unseen.map(|&p| names[p].clone()).collect();
+        }
+        out
+    }
+
+    /// Estimates of the combinations.
+    ///
+    /// # Errors
+    /// [`SimulationError`].
+    fn combinations(&self) -> Result<Vec<Estimate>, SimulationError> {
+        let (n, units) = (self.plan.unknowns(), self.plan.platform.units());
+        let of = |(i, c): (usize, &PredictedCombination)| -> Result<Estimate, SimulationError> {
+            let verdict = (c.status, c.degree, c.accuracy_order, c.determined_at_end);
+            let lead = c.terms[0].0;
+            let predicted = self.attained.sigma_of(&c.terms)? / si_per_shown(units[lead]);
+            let wanted = [self.required(lead), c.determined_at_end.then_some(predicted)];
+            let bench = added_to(self.bench, &c.terms) / si_per_shown(units[lead]);
+            Ok(estimate(&c.expression, units[lead], verdict, (n + i, self.record), wanted, bench))
+        };
+        self.prediction.combinations.iter().enumerate().map(of).collect()
+    }
 }
 
 /// Outcome of the requirements in the run, and the reasons why its sigmas may differ from the predicted ones.

@@ -4,8 +4,8 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::degree::{Status, Verdict};
 use obsdeg_core::system::{
-    DigitsReport, ModelError, PolynomialDirection, Role, StateStart, Symmetry, SystemModel, Unknown,
-    judge_compiled, symmetries, symmetry_reports,
+    Compiled, DigitsReport, Judgement, ModelError, PolynomialDirection, Role, StateStart, Symmetry,
+    SystemModel, Unknown, judge_compiled, symmetries, symmetry_reports,
 };
 use obsdeg_ekf::decomposition::singular_values;
 use obsdeg_ekf::integrate::runge_kutta;
@@ -220,95 +220,32 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
     let found = symmetries(model, &compiled, &judged, seed)?;
-    let setup = RunNumbers::new(model, &compiled)?;
-    let unknowns = &judged.layout.unknowns;
-    let columns: Vec<usize> = unknowns.iter().filter_map(|u| place(&setup.numeric, u)).collect();
-    if columns.len() != unknowns.len() {
-        let message = "some unknowns are no states of the filter".into();
-        return Err(ModelError { what: model.name.clone(), message, span: None }.into());
-    }
-    let filter = |error| RunError::Filter { time: setup.duration, duration: setup.duration, error };
-    let (mut whole, size) = rows(&setup, setup.duration)?;
-    let rank = judged.findings.degrees.rank();
-    let weight = |c: usize| whole.column(columns[c]).norm() * setup.prior[columns[c]];
-    let largest = (0..columns.len()).map(weight).fold(size, f64::max);
-    let rounded: Vec<bool> = (0..columns.len()).map(|c| weight(c) <= ROUNDING * largest).collect();
-    for (&c, _) in columns.iter().zip(&rounded).filter(|(_, rounded)| **rounded) {
-        whole.column_mut(c).fill(0.0);
-    }
-    // a derivative beyond the bound may determine an unknown that no verdict covers
-    let open = judged.rests_on_bound;
-    let inflated = inflation(&setup, &whole, &columns).map_err(filter)?;
+    let run = SampledRun::new(model, &compiled, &judged)?;
+    let SampledRun { setup, columns, rows, .. } = &run;
+    let inflated = inflation(setup, rows, columns).map_err(|e| run.stopped(e))?;
     // with jumps, dwell may determine early what only late derivatives do: slopes then follow the accuracy
     // orders
     let slopes =
         if setup.numeric.segments() == 1 && model.states.iter().all(|s| s.start == StateStart::Unknown) {
-            slopes(&setup, &columns, rank)?
+            slopes(setup, columns, run.rank)?
         } else {
             vec![None; columns.len()]
         };
-    let quantities: Vec<SystemQuantityEvidence> = unknowns
-        .iter()
-        .enumerate()
-        .map(|(c, u)| {
-            let Verdict { status, degree } = judged.verdict_on(c);
-            let (inflated, left) = inflated[c];
-            let mut inflation = rules::LINEARISED.check(degree.is_some(), Some(inflated));
-            let faint = rounded[c] || (degree.is_some() && left > LEFT);
-            if inflation.fails() && (faint || status == Status::NotSeen) {
-                inflation.outcome = Agreement::NotResolvable;
-            }
-            // without a degree no slope is expected
-            let measured = slopes[c].filter(|_| degree.is_some());
-            SystemQuantityEvidence {
-                name: u.name.clone(),
-                status,
-                degree,
-                slope: rules::slope(degree, measured),
-                inflation,
-            }
-        })
-        .collect();
-    let (m, norms) = scaled(&whole, &columns);
-    let (values, _) = singular_values(&m.clone().qr().r()).map_err(filter)?;
+    let quantities = run.quantities(&judged, &inflated, &slopes);
+    let (m, norms) = scaled(rows, columns);
+    let (values, _) = singular_values(&m.clone().qr().r()).map_err(|e| run.stopped(e))?;
     let largest = values.first().copied().unwrap_or(1.0);
-    let vanish = |limit: f64| values.iter().filter(|s| **s <= limit * largest).count();
-    let (hidden, unseen) = (vanish(UNSEEN), vanish(SEEN));
-    let mut defect = rules::defect(unknowns.len() - rank, &values, SEEN);
-    // number of observable unknowns too weak to be separated from rounding
-    let faint = (0..columns.len()).filter(|&c| rounded[c] && quantities[c].degree.is_some()).count();
-    if (hidden.saturating_sub(faint)..=unseen).contains(&defect.predicted)
-        && defect.predicted != defect.measured
-    {
-        defect.outcome = Agreement::NotResolvable;
-    }
-    // at values that hide an observable unknown, one more direction vanishes
-    let blurred =
-        quantities.iter().any(|q| q.degree.is_some() && q.inflation.outcome == Agreement::NotResolvable);
-    if defect.measured > defect.predicted && blurred {
-        defect.outcome = Agreement::NotResolvable;
-    }
-    if open && defect.measured < defect.predicted {
-        defect.outcome = Agreement::NotResolvable;
-    }
+    let defect = run.defect(&values, largest, &quantities);
     let directions = found
         .found
         .iter()
-        .map(|s| direction(s, &setup.truth, &columns))
-        .chain(found.polynomial.iter().map(|d| polynomial_direction(d, &setup, &columns)));
+        .map(|s| direction(s, &setup.truth, columns))
+        .chain(found.polynomial.iter().map(|d| polynomial_direction(d, setup, columns)));
     let symmetries: Vec<SymmetryEvidence> = directions
         .zip(symmetry_reports(model, &judged, &found))
-        .map(|(mut v, report)| {
-            for (x, norm) in v.iter_mut().zip(&norms) {
-                *x *= norm;
-            }
-            let seen = (&m * &v).norm() / (v.norm() * largest);
-            // the derivatives are integrated by Runge-Kutta, whose error respects a symmetry
-            let mut seen = Check::new(0.0, Some(seen), |x| x <= 1e-6);
-            if open && seen.fails() {
-                seen.outcome = Agreement::NotResolvable;
-            }
-            SymmetryEvidence { words: report.words, seen }
+        .map(|(v, report)| SymmetryEvidence {
+            words: report.words,
+            seen: run.seen_along(v, (&m, &norms[..]), largest),
         })
         .collect();
     let measured = quantities.iter().flat_map(|q| [q.slope.outcome, q.inflation.outcome]);
@@ -326,13 +263,123 @@ pub fn crosscheck_system(model: &SystemModel, seed: u64) -> Result<SystemEvidenc
         checks: counts.agree + counts.disagree,
         not_resolvable: counts.not_resolvable,
         passed: counts.disagree == 0,
-        seen_up_to: open.then(|| judged.findings.degrees.rank_profile.len().saturating_sub(1)),
+        seen_up_to: run.open.then(|| judged.findings.degrees.rank_profile.len().saturating_sub(1)),
         time: compiled.uses_time().then(|| model.time.number()),
         duration: setup.duration,
         error_bound: judged.error_bound(),
         digits: judged.digits(),
         seed,
     })
+}
+
+/// Samples of the whole run, as rows of derivatives by the unknowns at the start.
+struct SampledRun<'a> {
+    setup: RunNumbers<'a>,
+    /// Index of the filter state, by unknown.
+    columns: Vec<usize>,
+    /// Rows by filter state; zero for unknowns that are rounding.
+    rows: DMatrix<f64>,
+    /// True for each unknown that affects the outputs by no more than rounding.
+    rounded: Vec<bool>,
+    /// Rank by the verdicts.
+    rank: usize,
+    /// True if a derivative beyond the bound may determine an unknown that no verdict covers.
+    open: bool,
+}
+
+impl<'a> SampledRun<'a> {
+    fn new(model: &SystemModel, compiled: &'a Compiled, judged: &Judgement) -> Result<Self, RunError> {
+        let setup = RunNumbers::new(model, compiled)?;
+        let unknowns = &judged.layout.unknowns;
+        let columns: Vec<usize> = unknowns.iter().filter_map(|u| place(&setup.numeric, u)).collect();
+        if columns.len() != unknowns.len() {
+            let message = "some unknowns are no states of the filter".into();
+            return Err(ModelError { what: model.name.clone(), message, span: None }.into());
+        }
+        let (mut whole, size) = rows(&setup, setup.duration)?;
+        let weight = |c: usize| whole.column(columns[c]).norm() * setup.prior[columns[c]];
+        let largest = (0..columns.len()).map(weight).fold(size, f64::max);
+        let rounded: Vec<bool> = (0..columns.len()).map(|c| weight(c) <= ROUNDING * largest).collect();
+        for (&c, _) in columns.iter().zip(&rounded).filter(|(_, rounded)| **rounded) {
+            whole.column_mut(c).fill(0.0);
+        }
+        let (rank, open) = (judged.findings.degrees.rank(), judged.rests_on_bound);
+        Ok(Self { setup, columns, rows: whole, rounded, rank, open })
+    }
+
+    /// Error of numbers of the whole run.
+    fn stopped(&self, error: EkfError) -> RunError {
+        RunError::Filter { time: self.setup.duration, duration: self.setup.duration, error }
+    }
+
+    /// Evidence on the unknowns, by the factors of [`inflation`] and the slopes.
+    fn quantities(
+        &self,
+        judged: &Judgement,
+        inflated: &[(f64, f64)],
+        slopes: &[Option<f64>],
+    ) -> Vec<SystemQuantityEvidence> {
+        let of = |(c, u): (usize, &Unknown)| {
+            let Verdict { status, degree } = judged.verdict_on(c);
+            let (inflated, left) = inflated[c];
+            let mut inflation = rules::LINEARISED.check(degree.is_some(), Some(inflated));
+            let faint = self.rounded[c] || (degree.is_some() && left > LEFT);
+            if inflation.fails() && (faint || status == Status::NotSeen) {
+                inflation.outcome = Agreement::NotResolvable;
+            }
+            // without a degree no slope is expected
+            let measured = slopes[c].filter(|_| degree.is_some());
+            SystemQuantityEvidence {
+                name: u.name.clone(),
+                status,
+                degree,
+                slope: rules::slope(degree, measured),
+                inflation,
+            }
+        };
+        judged.layout.unknowns.iter().enumerate().map(of).collect()
+    }
+
+    /// Evidence on the number of unobservable directions, by the singular values, the largest of which is
+    /// `largest`.
+    fn defect(&self, values: &[f64], largest: f64, quantities: &[SystemQuantityEvidence]) -> Count {
+        let vanish = |limit: f64| values.iter().filter(|s| **s <= limit * largest).count();
+        let (hidden, unseen) = (vanish(UNSEEN), vanish(SEEN));
+        let mut defect = rules::defect(self.columns.len() - self.rank, values, SEEN);
+        // number of observable unknowns too weak to be separated from rounding
+        let faint =
+            (0..self.columns.len()).filter(|&c| self.rounded[c] && quantities[c].degree.is_some()).count();
+        if (hidden.saturating_sub(faint)..=unseen).contains(&defect.predicted)
+            && defect.predicted != defect.measured
+        {
+            defect.outcome = Agreement::NotResolvable;
+        }
+        // at values that hide an observable unknown, one more direction vanishes
+        let blurred =
+            quantities.iter().any(|q| q.degree.is_some() && q.inflation.outcome == Agreement::NotResolvable);
+        if defect.measured > defect.predicted && blurred {
+            defect.outcome = Agreement::NotResolvable;
+        }
+        if self.open && defect.measured < defect.predicted {
+            defect.outcome = Agreement::NotResolvable;
+        }
+        defect
+    }
+
+    /// Check of the information along the direction `v` of a symmetry, relative to the `largest`; `m` has
+    /// columns of unit length, `norms` were their lengths.
+    fn seen_along(&self, mut v: DVector<f64>, (m, norms): (&DMatrix<f64>, &[f64]), largest: f64) -> Check {
+        for (x, norm) in v.iter_mut().zip(norms) {
+            *x *= norm;
+        }
+        let seen = (m * &v).norm() / (v.norm() * largest);
+        // the derivatives are integrated by Runge-Kutta, whose error respects a symmetry
+        let mut seen = Check::new(0.0, Some(seen), |x| x <= 1e-6);
+        if self.open && seen.fails() {
+            seen.outcome = Agreement::NotResolvable;
+        }
+        seen
+    }
 }
 
 fn quotient((p, q): (i64, i64)) -> f64 {

@@ -329,83 +329,25 @@ fn complement(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
 pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Traces), RunError> {
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, None)?;
-    let RunNumbers { numeric, mut truth, prior, sigmas, duration, step } = RunNumbers::new(model, &compiled)?;
-    let segments = numeric.segments();
-    let parts = segments * numeric.experiments();
-    let samples = (duration / step / segments as f64 - 1e-9).ceil().max(1.0);
+    let numbers = RunNumbers::new(model, &compiled)?;
+    let (segments, duration) = (numbers.numeric.segments(), numbers.duration);
+    let parts = segments * numbers.numeric.experiments();
+    let samples = (duration / numbers.step / segments as f64 - 1e-9).ceil().max(1.0);
     if samples * parts as f64 > MAX_SAMPLES {
         return Err(
             missing("the step of the simulation", "too short; expected at most 1000000 samples").into()
         );
     }
-    let dt = duration / segments as f64 / samples;
-    let mut noise = Noise::new(seed, 0);
-    let n = truth.len();
-    let (error, p0) = initial_error(&numeric, &truth, &prior, &mut noise);
-    let estimate = &truth + error;
-    let stopped = |time: f64| move |error| RunError::Filter { time, duration, error };
-    let mut filter = Filter::new(estimate, &p0, Form::Ud).map_err(stopped(0.0))?;
-    let mut tangent = Tangent::new(&numeric, &truth, &prior);
-    let mut traces = Traces {
-        names: numeric.names.clone(),
-        units: numeric.states.iter().map(|s| unit(model, s)).collect(),
-        scales: vec![1.0; n],
-        series: vec![Series::default(); n],
-        ..Traces::default()
-    };
-    let mut record = |time: f64, part: usize, truth: &DVector<f64>, filter: &Filter| {
-        traces.time.push(time);
-        traces.position.push(part);
-        let own = filter.covariance().sigmas();
-        for (c, s) in traces.series.iter_mut().enumerate() {
-            s.truth.push(truth[c]);
-            s.estimate.push(filter.x()[c]);
-            s.sigma.push(own[c]);
-        }
-    };
-    record(0.0, 0, &truth, &filter);
-    let mut whitened = Vec::new();
+    let mut run = FilterRun::new(model, &numbers, samples, seed)?;
     for part in 0..parts {
-        // every experiment has its own time
-        let begin = (part % segments) as f64 * samples * dt;
-        let before = (part / segments) as f64 * duration;
-        let (behind, _) = numeric.carry(part, begin, &truth);
-        let (x, phi) = numeric.carry(part, begin, filter.x());
-        if behind != truth || x != *filter.x() {
-            if let Some(tangent) = &mut tangent {
-                tangent.carry(&numeric.carry(part, begin, &truth).1);
-            }
-            truth = behind;
-            // a jump that forgets a state leaves its variance: as good as known
-            let p = &phi * filter.covariance().matrix() * phi.transpose();
-            let floor =
-                DMatrix::from_diagonal(&DVector::from_iterator(n, prior.iter().map(|s| (KNOWN * s).powi(2))));
-            filter = Filter::new(x, &(p + floor), Form::Ud).map_err(stopped(begin))?;
-        }
-        let process = numeric.process(part);
-        let measurement = numeric.measurement(part, &sigmas);
-        for k in 0..samples as usize {
-            interrupt::check();
-            let t = begin + k as f64 * dt;
-            let moved = runge_kutta(&process, t, &truth, dt, SUBSTEPS).map_err(stopped(t))?;
-            truth = moved.x;
-            if let Some(tangent) = &mut tangent {
-                tangent.carry(&moved.phi);
-            }
-            filter.predict(&process, t, dt, SUBSTEPS).map_err(stopped(t))?;
-            let mut z = measurement.h(t + dt, &truth);
-            for (z, sigma) in z.iter_mut().zip(&sigmas) {
-                *z += sigma * noise.normal();
-            }
-            whitened.extend(filter.update(&measurement, t + dt, &z).map_err(stopped(t + dt))?.whitened);
-            record(before + t + dt, part, &truth, &filter);
-        }
+        run.part(part)?;
     }
-    let estimates = estimates(model, &judged, &numeric, &traces, &prior);
+    let FilterRun { mut traces, filter, truth, tangent, whitened, dt, .. } = run;
+    let estimates = estimates(model, &judged, &numbers.numeric, &traces, &numbers.prior);
     traces.determined = estimates.iter().map(SystemEstimate::is_determined).collect();
     let consistency = Consistency::of(Outcomes {
         whitened: &whitened,
-        outputs: sigmas.len(),
+        outputs: numbers.sigmas.len(),
         error: (filter.x() - &truth).as_slice().to_vec(),
         covariance: filter.covariance(),
         normalised: estimates.iter().map(|e| (e.name.as_str(), e.error_over_sigma)).collect(),
@@ -418,18 +360,139 @@ pub fn simulate_system(model: &SystemModel, seed: u64) -> Result<(SystemRun, Tra
             version: env!("CARGO_PKG_VERSION").into(),
             name: model.name.clone(),
             quantities: estimates,
-            consistency: consistency.map_err(stopped(duration))?,
+            consistency: consistency.map_err(stopped(duration, duration))?,
             time: compiled.uses_time().then(|| model.time.number()),
             duration,
             step: dt,
-            noise: model.outputs.iter().map(|o| o.0.name.clone()).zip(sigmas).collect(),
-            priors_by_default: priors_by_default(model, &numeric),
+            noise: model
+                .outputs
+                .iter()
+                .map(|o| o.0.name.clone())
+                .zip(numbers.sigmas.iter().copied())
+                .collect(),
+            priors_by_default: priors_by_default(model, &numbers.numeric),
             error_bound: judged.error_bound(),
             digits: judged.digits(),
             seed,
         },
         traces,
     ))
+}
+
+/// Error of a filter at `time` of a run of `duration`.
+fn stopped(time: f64, duration: f64) -> impl Fn(EkfError) -> RunError {
+    move |error| RunError::Filter { time, duration, error }
+}
+
+/// Filter and truth along a run.
+struct FilterRun<'a> {
+    numbers: &'a RunNumbers<'a>,
+    /// Number of samples of a part, and the time between two.
+    samples: f64,
+    dt: f64,
+    truth: DVector<f64>,
+    filter: Filter,
+    tangent: Option<Tangent>,
+    noise: Noise,
+    traces: Traces,
+    whitened: Vec<f64>,
+}
+
+impl<'a> FilterRun<'a> {
+    /// Start of a run with `samples` samples in each part.
+    fn new(
+        model: &SystemModel,
+        numbers: &'a RunNumbers<'a>,
+        samples: f64,
+        seed: u64,
+    ) -> Result<Self, RunError> {
+        let RunNumbers { numeric, truth, prior, duration, .. } = numbers;
+        let mut noise = Noise::new(seed, 0);
+        let (error, p0) = initial_error(numeric, truth, prior, &mut noise);
+        let estimate = truth + error;
+        let filter = Filter::new(estimate, &p0, Form::Ud).map_err(stopped(0.0, *duration))?;
+        let traces = Traces {
+            names: numeric.names.clone(),
+            units: numeric.states.iter().map(|s| unit(model, s)).collect(),
+            scales: vec![1.0; truth.len()],
+            series: vec![Series::default(); truth.len()],
+            ..Traces::default()
+        };
+        let mut out = Self {
+            numbers,
+            samples,
+            dt: duration / numeric.segments() as f64 / samples,
+            truth: truth.clone(),
+            filter,
+            tangent: Tangent::new(numeric, truth, prior),
+            noise,
+            traces,
+            whitened: Vec::new(),
+        };
+        out.record(0.0, 0);
+        Ok(out)
+    }
+
+    /// Adds truth, estimate and sigmas at a time of the run to the traces.
+    fn record(&mut self, time: f64, part: usize) {
+        self.traces.time.push(time);
+        self.traces.position.push(part);
+        let own = self.filter.covariance().sigmas();
+        for (c, s) in self.traces.series.iter_mut().enumerate() {
+            s.truth.push(self.truth[c]);
+            s.estimate.push(self.filter.x()[c]);
+            s.sigma.push(own[c]);
+        }
+    }
+
+    /// Jump into a part, which begins at `begin` of its experiment.
+    fn jump(&mut self, part: usize, begin: f64) -> Result<(), RunError> {
+        let RunNumbers { numeric, prior, duration, .. } = self.numbers;
+        let (behind, jacobian) = numeric.carry(part, begin, &self.truth);
+        let (x, phi) = numeric.carry(part, begin, self.filter.x());
+        if behind != self.truth || x != *self.filter.x() {
+            if let Some(tangent) = &mut self.tangent {
+                tangent.carry(&jacobian);
+            }
+            self.truth = behind;
+            // a jump that forgets a state leaves its variance: as good as known
+            let p = &phi * self.filter.covariance().matrix() * phi.transpose();
+            let floor = prior.iter().map(|s| (KNOWN * s).powi(2));
+            let floor = DMatrix::from_diagonal(&DVector::from_iterator(prior.len(), floor));
+            self.filter = Filter::new(x, &(p + floor), Form::Ud).map_err(stopped(begin, *duration))?;
+        }
+        Ok(())
+    }
+
+    /// Runs the filter through a part. Every experiment has its own time.
+    fn part(&mut self, part: usize) -> Result<(), RunError> {
+        let RunNumbers { numeric, sigmas, duration, .. } = self.numbers;
+        let (segments, dt) = (numeric.segments(), self.dt);
+        let begin = (part % segments) as f64 * self.samples * dt;
+        let before = (part / segments) as f64 * duration;
+        self.jump(part, begin)?;
+        let process = numeric.process(part);
+        let measurement = numeric.measurement(part, sigmas);
+        let stopped = |time: f64| stopped(time, *duration);
+        for k in 0..self.samples as usize {
+            interrupt::check();
+            let t = begin + k as f64 * dt;
+            let moved = runge_kutta(&process, t, &self.truth, dt, SUBSTEPS).map_err(stopped(t))?;
+            self.truth = moved.x;
+            if let Some(tangent) = &mut self.tangent {
+                tangent.carry(&moved.phi);
+            }
+            self.filter.predict(&process, t, dt, SUBSTEPS).map_err(stopped(t))?;
+            let mut z = measurement.h(t + dt, &self.truth);
+            for (z, sigma) in z.iter_mut().zip(sigmas) {
+                *z += sigma * self.noise.normal();
+            }
+            let updated = self.filter.update(&measurement, t + dt, &z).map_err(stopped(t + dt))?;
+            self.whitened.extend(updated.whitened);
+            self.record(before + t + dt, part);
+        }
+        Ok(())
+    }
 }
 
 fn unit(model: &SystemModel, state: &FilterState) -> String {

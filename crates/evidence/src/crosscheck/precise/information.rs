@@ -72,20 +72,7 @@ impl SampleInformation {
             let local = LocalUnknown { columns, rows };
             local.add(d, &moments[i].gram, &mut matrix);
             if between == Between::Dwell {
-                let moved = &moments[i].end;
-                let after: [Vector; 3] = std::array::from_fn(|r| {
-                    // effect of the dwell on torqued psi^n, less the torqued psi^n itself: no digits remain
-                    // where nothing moves it
-                    let change = |j: usize| d.sub(&moved[r][j], &d.int(i64::from(r == j)));
-                    let change: [Real; 3] = std::array::from_fn(change);
-                    let after = |k: usize| {
-                        let own = carried.iter().chain(&local.rows[3..6]).map(|row| &row[k]);
-                        d.dot(
-                            moved[r].iter().zip(own).chain(change.iter().zip((0..3).map(|j| &torqued[j][k]))),
-                        )
-                    };
-                    (0..local.columns.len()).map(after).collect()
-                });
+                let after = local.after(d, &moments[i].end, (&carried, &torqued));
                 psi = std::array::from_fn(|j| {
                     (0..local.columns.len())
                         .map(|k| d.dot((0..3).map(|r| (&to_n[r][j], &after[r][k]))))
@@ -105,6 +92,27 @@ impl SampleInformation {
 }
 
 impl LocalUnknown {
+    /// `psi^n` after a dwell that moves it by `moved`, less the torqued one, by the carried and the torqued
+    /// psi^n before.
+    fn after(
+        &self,
+        d: Digits,
+        moved: &[Vector; 3],
+        (carried, torqued): (&[Vector; 3], &[Vector; 3]),
+    ) -> [Vector; 3] {
+        std::array::from_fn(|r| {
+            // effect of the dwell on torqued psi^n, less the torqued psi^n itself: no digits remain where
+            // nothing moves it
+            let change = |j: usize| d.sub(&moved[r][j], &d.int(i64::from(r == j)));
+            let change: [Real; 3] = std::array::from_fn(change);
+            let after = |k: usize| {
+                let own = carried.iter().chain(&self.rows[3..6]).map(|row| &row[k]);
+                d.dot(moved[r].iter().zip(own).chain(change.iter().zip((0..3).map(|j| &torqued[j][k]))))
+            };
+            (0..self.columns.len()).map(after).collect()
+        })
+    }
+
     /// Adds `L^T G L` to `matrix`.
     fn add(&self, d: Digits, gram: &[Vector], matrix: &mut [Vector]) {
         let c = self.columns.len();

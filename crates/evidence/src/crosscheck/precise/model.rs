@@ -16,7 +16,7 @@ pub(super) const LOCAL: usize = 9;
 
 /// Observed output: an entry of psi^n with its sign, and an entry of a^n.
 #[derive(Clone, Copy)]
-struct Output {
+struct PreciseOutput {
     psi: Option<(usize, bool)>,
     error: Option<usize>,
     azimuth: bool,
@@ -43,7 +43,7 @@ pub(in super::super) struct Model {
     ratios: Vec<Real>,
     /// Matrix of `psi x omega_ie`.
     turning: [Vector; 3],
-    outputs: Vec<Output>,
+    outputs: Vec<PreciseOutput>,
 }
 
 /// Weights of a sample of Z and of a measured azimuth: one over the variance of the noise.
@@ -252,6 +252,20 @@ fn torqued(
     Some(torqued)
 }
 
+/// Observed outputs: `Z^n = (psi_z, 0, -psi_x) + a^n`, and psi_y where the azimuth is measured.
+fn outputs(scheme: &Scheme) -> Vec<PreciseOutput> {
+    let z =
+        |psi: Option<(usize, bool)>, error: usize| PreciseOutput { psi, error: Some(error), azimuth: false };
+    let mut out = vec![z(Some((2, false)), 0), z(Some((0, true)), 2)];
+    if scheme.unknowns.have(Source::Force) {
+        out.push(z(None, 1));
+    }
+    if scheme.measured_azimuth {
+        out.push(PreciseOutput { psi: Some((1, false)), error: None, azimuth: true });
+    }
+    out
+}
+
 impl Model {
     /// Model of a scheme without generic angles and rotations, at its latitude. `None` when memory does not
     /// suffice for the constants, or without a latitude.
@@ -302,15 +316,6 @@ impl Model {
             vec![zero(), zero(), w_n.clone()],
             vec![w_u.clone(), w_n.neg(), zero()],
         ];
-        // Z^n = (psi_z, 0, -psi_x) + a^n, and psi_y where the azimuth is measured
-        let z = |psi: Option<(usize, bool)>, error: usize| Output { psi, error: Some(error), azimuth: false };
-        let mut outputs = vec![z(Some((2, false)), 0), z(Some((0, true)), 2)];
-        if scheme.unknowns.have(Source::Force) {
-            outputs.push(z(None, 1));
-        }
-        if scheme.measured_azimuth {
-            outputs.push(Output { psi: Some((1, false)), error: None, azimuth: true });
-        }
         let unknowns = psi + drifts[0][0].len();
         let reset = scheme.carry == Carry::Reset && scheme.unknowns != Unknowns::Drift;
         let carried = match (&scheme.unknowns, scheme.carry) {
@@ -318,6 +323,7 @@ impl Model {
             (_, Carry::Inertial) => vec![attitudes[0].clone(); attitudes.len()],
             _ => attitudes,
         };
+        let outputs = outputs(scheme);
         Some(Self { digits, unknowns, reset, carried, drifts, errors, torqued, ratios, turning, outputs })
     }
 

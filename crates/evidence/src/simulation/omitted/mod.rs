@@ -17,8 +17,8 @@ mod score;
 mod tests;
 pub(crate) mod weights;
 
-use obsdeg_core::model::{OmittedModel, OmittedTerm};
-use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
+use obsdeg_core::model::{OmittedModel, OmittedTerm, Platform};
+use obsdeg_core::omitted::{OmittedClass, OmittedVerdict, omitted_verdicts};
 
 pub use answer::{
     Advice, AdviceKind, Budget, BudgetLine, CarryUncertainty, ChangePerUnit, Composition, CorrelatedNoise,
@@ -105,28 +105,13 @@ pub fn term_effects(
     let totals = bench.totals(&attained.sigmas, &changes);
     let names = platform.names();
     let margins = Margins { names, required: &required, totals: &totals };
-    let terms = model.terms().iter().enumerate().map(|(j, t)| {
-        let verdict = verdicts.as_ref().map(|v| &v.terms[j]);
-        let class = verdict.map(|v| v.class);
-        let size = bench.sizes[j];
-        let sensitivities = (0..names.len()).filter(|&c| changes[c][j] != 0.0).map(|c| ChangePerUnit {
-            unknown: names[c].clone(),
-            unit: shown_unit(platform.units()[c]).into(),
-            per_unit: changes[c][j],
-        });
-        OmittedEffect {
-            name: t.name.clone(),
-            family: t.family.into(),
-            unit: t.unit.into(),
-            class,
-            exact: verdict.and_then(|v| v.exact.clone()),
-            visible_from: visible_from(t, class, influence.information[j], influence.squares[j]),
-            size,
-            sensitivities: sensitivities.collect(),
-            uses_up: margins.used_up(|c| changes[c][j], |c| changes[c][j] * size.unwrap_or(0.0)),
-        }
-    });
-    let terms: Vec<OmittedEffect> = terms.collect();
+    let terms: Vec<OmittedEffect> = (0..model.terms().len())
+        .map(|j| {
+            let verdict = verdicts.as_ref().map(|v| &v.terms[j]);
+            let shown = (influence.information[j], influence.squares[j]);
+            term_effect((platform, &model), j, verdict, shown, bench.sizes[j], (&changes[..], &margins))
+        })
+        .collect();
     let families = families(attained, (&model, &terms), &changes, &margins);
     let budget = |c: usize| {
         let (name, unit) = (names[c].as_str(), shown_unit(platform.units()[c]));
@@ -149,6 +134,36 @@ pub fn term_effects(
         priors: !conditions.stated_priors().is_empty(),
         attitudes: model.terms().iter().any(|t| t.family == "attitude"),
     })
+}
+
+/// Effect of the error `j` with its `size` in the bench. `shown` is its information in the samples, and the sum
+/// of their squares.
+fn term_effect(
+    (platform, model): (&Platform, &OmittedModel),
+    j: usize,
+    verdict: Option<&OmittedVerdict>,
+    shown: (f64, f64),
+    size: Option<f64>,
+    (changes, margins): (&[Vec<f64>], &Margins<'_>),
+) -> OmittedEffect {
+    let (names, t) = (platform.names(), &model.terms()[j]);
+    let class = verdict.map(|v| v.class);
+    let sensitivities = (0..names.len()).filter(|&c| changes[c][j] != 0.0).map(|c| ChangePerUnit {
+        unknown: names[c].clone(),
+        unit: shown_unit(platform.units()[c]).into(),
+        per_unit: changes[c][j],
+    });
+    OmittedEffect {
+        name: t.name.clone(),
+        family: t.family.into(),
+        unit: t.unit.into(),
+        class,
+        exact: verdict.and_then(|v| v.exact.clone()),
+        visible_from: visible_from(t, class, shown.0, shown.1),
+        size,
+        sensitivities: sensitivities.collect(),
+        uses_up: margins.used_up(|c| changes[c][j], |c| changes[c][j] * size.unwrap_or(0.0)),
+    }
 }
 
 /// Requirement and total uncertainty of every unknown.
