@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use clap::builder::styling::AnsiColor;
-use obsdeg_commands::{Kind, Place, Problem};
+use obsdeg_commands::{Kind, Problem, TextPlace};
 use obsdeg_report::{ReportError, in_ascii, visible};
 
 use crate::terminal::plain_messages;
@@ -87,7 +87,7 @@ impl Failure {
     }
 
     /// Bad input at a place of a text; the message draws the place.
-    fn at(message: &str, place: &Place) -> Self {
+    fn at(message: &str, place: &TextPlace) -> Self {
         let annotation = AnnotationKind::Primary.span(place.span.clone());
         let snippet = Snippet::source(&place.text).path(&place.name).annotation(annotation);
         let report = [Level::ERROR.primary_title(message).element(snippet)];
@@ -126,7 +126,7 @@ mod tests {
     /// Colours add only escape sequences, at the places where clap has them: title, margin, marks.
     #[test]
     fn messages_are_coloured() {
-        let place = Place { name: "a.toml".into(), text: "carry = \"x | ^\"\n".into(), span: 8..15 };
+        let place = TextPlace { name: "a.toml".into(), text: "carry = \"x | ^\"\n".into(), span: 8..15 };
         let failure = Failure::at("expected a carry", &place);
         let plain = |text: &str| anstream::adapter::strip_str(text).to_string();
         let lines: Vec<String> = failure.message.lines().map(|line| colored(line, true)).collect();

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Arg, Args};
-use obsdeg_report::{Answer, File, Format, Layout, csv, written};
+use obsdeg_report::{Answer, File, Format, TerminalLayout, csv, written};
 
 use crate::failure::Failure;
 use crate::files;
@@ -139,7 +139,7 @@ impl Output {
     }
 
     /// Text of a result in a format.
-    fn text(&self, result: &impl Answer, format: Format, layout: Layout) -> Result<String, Failure> {
+    fn text(&self, result: &impl Answer, format: Format, layout: TerminalLayout) -> Result<String, Failure> {
         Ok(match format {
             Format::Csv => csv(result, self.table.as_deref())?,
             _ => written(result, format, layout)?,
@@ -154,8 +154,8 @@ impl Output {
     /// Writes a result to the file or to stdout, a table with its details or without.
     pub(crate) fn write_all(&self, result: &impl Answer, details: bool) -> Result<(), Failure> {
         let stdout = self.target.path().is_none();
-        let layout = if stdout { layout(self.ascii) } else { Layout { ascii: self.ascii, ..PIPE } };
-        let layout = Layout { brief: !details, ..layout };
+        let layout = if stdout { layout(self.ascii) } else { TerminalLayout { ascii: self.ascii, ..PIPE } };
+        let layout = TerminalLayout { brief: !details, ..layout };
         self.target.write(self.text(result, self.format()?, layout)?.as_bytes(), &[])
     }
 
@@ -179,7 +179,7 @@ impl Output {
         let text = self.text(result, asked, layout(self.ascii))?;
         if let Some(folder) = self.target.path() {
             let _spinner = Spinner::start("drawing figures", self.target.quiet);
-            let bytes = written(result, Format::Json, Layout::default())?.into_bytes();
+            let bytes = written(result, Format::Json, TerminalLayout::default())?.into_bytes();
             let mut files = vec![File { name: json.into(), bytes }];
             files.extend(more()?);
             self.target.check_folder()?;

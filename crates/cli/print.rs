@@ -51,12 +51,12 @@ impl FromStr for PdfBy {
 
 /// Maker of a PDF that is there.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Printer {
+pub(crate) enum PdfPrinter {
     Browser(PathBuf),
     Typesetter,
 }
 
-impl Printer {
+impl PdfPrinter {
     /// Finds what is asked for; without a request a browser, else the typesetter.
     ///
     /// # Errors

@@ -17,7 +17,7 @@ use crate::input::read;
 use crate::interrupt;
 use crate::origin::command;
 use crate::output::Target;
-use crate::print::{PdfBy, Printer, print};
+use crate::print::{PdfBy, PdfPrinter, print};
 use crate::progress::Bar;
 
 const AFTER_HELP: &str = "\
@@ -98,7 +98,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     if a.pdf_by.is_some() && format != ReviewFormat::Pdf {
         return Err(Failure::input("--pdf-by does nothing without a PDF; expected -o FILE.pdf".into()));
     }
-    let printer = (format == ReviewFormat::Pdf).then(|| Printer::find(a.pdf_by.as_ref())).transpose()?;
+    let printer = (format == ReviewFormat::Pdf).then(|| PdfPrinter::find(a.pdf_by.as_ref())).transpose()?;
     let folder = picture_folder(&path.file_stem().unwrap_or_default().to_string_lossy());
     a.target.check()?;
     if matches!(format, ReviewFormat::Markdown | ReviewFormat::Latex) {
@@ -112,7 +112,8 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let origin = origin(command(), sources.iter().chain(calibrations.iter().map(|c| &c.source)));
     if read.is_empty() {
         a.asked.assumes_nothing()?;
-        let page = printer.as_ref().filter(|p| matches!(p, Printer::Browser(_))).map(|_| ReviewFormat::Html);
+        let page =
+            printer.as_ref().filter(|p| matches!(p, PdfPrinter::Browser(_))).map(|_| ReviewFormat::Html);
         let (files, read) = calibration_report(&calibrations, &origin, page.unwrap_or(format), &folder)?;
         let requirements = || read.iter().take(1).filter_map(|c| c.requirements.as_ref());
         a.met.check(requirements())?;
@@ -131,7 +132,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.met.check(reviewed.requirements())?;
     bar.set_message("writing");
     let written = match &printer {
-        Some(Printer::Browser(_)) => reviewed.files(&origin, ReviewFormat::Html, &folder)?,
+        Some(PdfPrinter::Browser(_)) => reviewed.files(&origin, ReviewFormat::Html, &folder)?,
         _ => reviewed.files(&origin, format, &folder)?,
     };
     drop(bar);
@@ -143,8 +144,8 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
 
 impl Arguments {
     /// Writes the text, printed by the browser where one is given, and the pictures beside it.
-    fn write(&self, mut files: Vec<File>, printer: Option<&Printer>) -> Result<(), Failure> {
-        if let (Some(Printer::Browser(browser)), Some(page)) = (printer, files.first_mut()) {
+    fn write(&self, mut files: Vec<File>, printer: Option<&PdfPrinter>) -> Result<(), Failure> {
+        if let (Some(PdfPrinter::Browser(browser)), Some(page)) = (printer, files.first_mut()) {
             let bar = Bar::start(self.target.quiet);
             bar.set_message("printing");
             page.bytes = print(browser, &page.bytes)?;

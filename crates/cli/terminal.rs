@@ -2,20 +2,21 @@
 
 use std::io::IsTerminal;
 
-use obsdeg_report::Layout;
+use obsdeg_report::TerminalLayout;
 
 /// Layout of a table that does not go to a terminal: 120 columns, no colours.
-pub(crate) const PIPE: Layout = Layout { width: Some(120), color: false, ascii: false, brief: false };
+pub(crate) const PIPE: TerminalLayout =
+    TerminalLayout { width: Some(120), color: false, ascii: false, brief: false };
 
 /// Width, colours and character set of a table on stdout.
-pub(crate) fn layout(ascii: bool) -> Layout {
+pub(crate) fn layout(ascii: bool) -> TerminalLayout {
     let stdout = std::io::stdout();
     let terminal = stdout.is_terminal();
     let ascii = ascii || plain(terminal, variable);
     if !terminal {
-        return Layout { ascii, ..PIPE };
+        return TerminalLayout { ascii, ..PIPE };
     }
-    Layout {
+    TerminalLayout {
         width: terminal_size::terminal_size().map(|(w, _)| w.0),
         color: anstream::AutoStream::choice(&stdout) != anstream::ColorChoice::Never,
         ascii,

@@ -11,7 +11,8 @@ fn judged(text: &str) -> SystemAnalysis {
 
 /// The answer as printed, in one line.
 fn printed(a: &SystemAnalysis) -> String {
-    let text = obsdeg_report::written(a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+    let text =
+        obsdeg_report::written(a, obsdeg_report::Format::Table, obsdeg_report::TerminalLayout::default());
     text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 

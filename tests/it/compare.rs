@@ -7,7 +7,7 @@ use obsdeg_core::model::{Carry, Rotation, Scheme};
 use obsdeg_evidence::compare::{ComparedScheme, Entry, compare};
 use obsdeg_evidence::requirements::Miss;
 use obsdeg_evidence::simulation::{Conditions, simulate};
-use obsdeg_report::{Format, Layout};
+use obsdeg_report::{Format, TerminalLayout};
 
 use crate::program::{json, run, stderr, stdout};
 use crate::schemes::{S6, paper, scheme};
@@ -401,7 +401,7 @@ fn sigmas_at_the_schemes_own_drifts() {
         &compare(&[Entry { name: "p1p2".into(), scheme: paper(Carry::Platform), conditions: own }], 1)
             .expect("compared"),
         Format::Table,
-        Layout::default(),
+        TerminalLayout::default(),
     )
     .expect("text");
     assert!(

@@ -196,7 +196,11 @@ fn sums_of_expanded_squares_have_no_point() {
 fn one_of_several_ways_is_named() {
     for (constraint, named) in [("x^2 - y^2 = 0", true), ("x*y = 0", false), ("x + y = 1", false)] {
         let a = judged(&[constraint], "", 1).expect("judged");
-        let text = obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text = obsdeg_report::written(
+            &a,
+            obsdeg_report::Format::Table,
+            obsdeg_report::TerminalLayout::default(),
+        );
         let text = text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(text.contains("can hold in several ways"), named, "{text}");
     }
@@ -227,7 +231,11 @@ fn all_that_is_said_is_of_one_way() {
         }
         seen[0] += usize::from(a.rank == 1);
         let a = answer("(x - y)*(x + y - z) = 0", "s='x - y + z*(x - y)'", seed);
-        let text = obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text = obsdeg_report::written(
+            &a,
+            obsdeg_report::Format::Table,
+            obsdeg_report::TerminalLayout::default(),
+        );
         let text = text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
         if a.rank == 1 {
             for wrong in ["z: know x", "z: know y", "z: know one of"] {
@@ -311,7 +319,11 @@ fn products_are_judged_by_the_factor_that_is_named() {
             assert_eq!(way.given, rest.contains("y=0"), "{constraints:?} {rest}");
         }
         let a = judged(constraints, &rest, 1).expect("judged");
-        let text = obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text = obsdeg_report::written(
+            &a,
+            obsdeg_report::Format::Table,
+            obsdeg_report::TerminalLayout::default(),
+        );
         let text = text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ");
         let ways: Vec<String> = others.iter().map(|o| format!("{o} = 0")).collect();
         let said = format!("holds where {factor} = 0 or where {}", ways.join(" or where "));

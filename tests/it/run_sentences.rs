@@ -2,7 +2,7 @@
 
 use obsdeg_core::system::{SystemModel, model_file};
 use obsdeg_evidence::crosscheck::Agreement;
-use obsdeg_report::{Format, Layout, written};
+use obsdeg_report::{Format, TerminalLayout, written};
 use serde_json::Value;
 
 use crate::program::{json, run, stdout};
@@ -217,7 +217,7 @@ fn beyond_the_bound_samples_speak_for_themselves() {
         assert!(of(name).inflation.measured.is_some_and(|x| x < 1.1), "{evidence:?}");
         assert_eq!(of(name).inflation.outcome, Agreement::NotResolvable);
     }
-    let text = joined(&written(&evidence, Format::Table, Layout::default()).expect("text"));
+    let text = joined(&written(&evidence, Format::Table, TerminalLayout::default()).expect("text"));
     for sentence in
         ["Directions that no derivative up to order 60 sees", "1 up to order 60, 0 singular values"]
     {
@@ -228,17 +228,17 @@ fn beyond_the_bound_samples_speak_for_themselves() {
     let (run, _) = obsdeg_evidence::system::simulate_system(&model, 1).expect("a run");
     let a = run.quantities.iter().find(|q| q.name == "a").expect("an unknown");
     assert!(a.sigma < 1e-9 * a.prior_sigma, "{a:?}");
-    let text = joined(&written(&run, Format::Table, Layout::default()).expect("text"));
+    let text = joined(&written(&run, Format::Table, TerminalLayout::default()).expect("text"));
     assert!(!text.contains("known from the prior only"), "{text}");
     // a proof of unobservability still counts
     let text = BEYOND.replace("a + b + a*u", "a + b").replace("known_inputs={u={function='t^70'}}\n", "");
     let model = read(&text);
     let evidence = obsdeg_evidence::system::crosscheck_system(&model, 1).expect("evidence");
     assert!(evidence.passed && evidence.seen_up_to.is_none(), "{evidence:?}");
-    let text = joined(&written(&evidence, Format::Table, Layout::default()).expect("text"));
+    let text = joined(&written(&evidence, Format::Table, TerminalLayout::default()).expect("text"));
     assert!(text.contains("Directions that no output sees") && text.contains("1 exact"), "{text}");
     let (run, _) = obsdeg_evidence::system::simulate_system(&model, 1).expect("a run");
-    let text = joined(&written(&run, Format::Table, Layout::default()).expect("text"));
+    let text = joined(&written(&run, Format::Table, TerminalLayout::default()).expect("text"));
     assert!(text.contains("known from the prior only") || text.contains("rests on the prior"), "{text}");
 }
 
@@ -249,7 +249,7 @@ fn combinations_beyond_the_bound_are_not_called_unobservable() {
     let status = |text: &str| {
         let options = SystemOptions { solutions: false, ..SystemOptions::default() };
         let a = analyze_system(&read(text), options).expect("judged");
-        let text = joined(&written(&a, Format::Table, Layout::default()).expect("text"));
+        let text = joined(&written(&a, Format::Table, TerminalLayout::default()).expect("text"));
         text.split("Combinations asked for").nth(1).expect("a table").to_string()
     };
     let asked = |text: &str| text.replace("[states]", "combinations=['a - b']\n[states]");

@@ -282,7 +282,8 @@ fn symmetries_of_the_reference_models() {
 /// Table of an answer, by the program.
 fn table(text: &str) -> String {
     let a = without_solutions(&read(text)).expect("judged");
-    obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default()).expect("text")
+    obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::TerminalLayout::default())
+        .expect("text")
 }
 
 /// Without a count no number is stated: the sine has infinitely many solutions, a square two.
@@ -315,7 +316,7 @@ fn first_lines_say_local() {
         let text = obsdeg_report::written(
             &a.expect("judged"),
             obsdeg_report::Format::Table,
-            obsdeg_report::Layout::default(),
+            obsdeg_report::TerminalLayout::default(),
         );
         text.expect("text").lines().nth(1).expect("a first line").trim().to_string()
     };
@@ -369,8 +370,11 @@ fn models_are_checked_without_a_filter() {
          noise={y=0.01}\nvalues={a=0.5, x=1.0}\npriors={a=1.0, x=1.0}",
     );
     let evidence = obsdeg_evidence::system::crosscheck_system(&model, 1).expect("evidence");
-    let text =
-        obsdeg_report::written(&evidence, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+    let text = obsdeg_report::written(
+        &evidence,
+        obsdeg_report::Format::Table,
+        obsdeg_report::TerminalLayout::default(),
+    );
     let text = text.expect("text");
     assert!(text.contains("agrees with the exact verdicts") && text.contains("(no filter is run)"), "{text}");
     assert!(!text.contains("filter and exact verdicts"), "{text}");
@@ -476,8 +480,11 @@ fn known_starts_are_not_called_unobservable() {
         let mut run = run.clone();
         let x = run.quantities.iter_mut().find(|q| q.name == "x").expect("the state");
         (x.status, x.error_over_sigma) = (status, 9.0);
-        let text =
-            obsdeg_report::written(&run, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text = obsdeg_report::written(
+            &run,
+            obsdeg_report::Format::Table,
+            obsdeg_report::TerminalLayout::default(),
+        );
         text.expect("text").contains("x: not observable, yet")
     };
     assert!(run.quantities.iter().any(|q| q.name == "x" && q.status.is_none()));
@@ -540,7 +547,11 @@ fn other_carries_say_what_is_compared() {
     use obsdeg_core::model::Carry;
     let said = |attitudes: &[&str], carry| {
         let a = crate::schemes::judged(&crate::schemes::scheme(attitudes, carry));
-        let text = obsdeg_report::written(&a, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text = obsdeg_report::written(
+            &a,
+            obsdeg_report::Format::Table,
+            obsdeg_report::TerminalLayout::default(),
+        );
         let of_one = a.carries.iter().flat_map(|c| &c.differs).any(|d| d.name.contains('@'));
         (of_one, text.expect("text").contains("is judged as a combination of its unknowns"))
     };

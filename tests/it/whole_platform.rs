@@ -482,7 +482,8 @@ fn fewest_positions_of_walks() {
     let hidden = Scheme { unknowns: unknowns("F,GS,K1,K3"), ..base };
     let none = walks(&hidden, &options, &|| true).expect("walks");
     let title = |w: &obsdeg_design::design::Walks| {
-        let text = obsdeg_report::written(w, obsdeg_report::Format::Table, obsdeg_report::Layout::default());
+        let text =
+            obsdeg_report::written(w, obsdeg_report::Format::Table, obsdeg_report::TerminalLayout::default());
         text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ")
     };
     // a sequence with all slews proves that no sequence suffices; an unsuccessful search does not

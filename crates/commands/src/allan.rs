@@ -4,7 +4,7 @@ use clap::Args;
 use obsdeg_calibration::Going;
 use obsdeg_calibration::noise::{NoiseError, NoiseOptions, SensorNoiseReport, sensor_noise};
 use obsdeg_calibration::record::{Record, STANDARD_GRAVITY};
-use obsdeg_report::{File, Format, Layout, ReportError, sensor_noise_figures, written};
+use obsdeg_report::{File, Format, ReportError, TerminalLayout, sensor_noise_figures, written};
 use serde::{Deserialize, Serialize};
 
 use crate::calibrate::{GRAVITY, number_within};
@@ -65,7 +65,7 @@ pub fn allan(a: &Allan, record: Record, host: &Host<'_>) -> Result<SensorNoiseRe
 /// # Errors
 /// [`ReportError`] of a figure that cannot be drawn.
 pub fn files(found: &SensorNoiseReport) -> Result<Vec<File>, ReportError> {
-    let coefficients = written(found, Format::Csv, Layout::default())?;
+    let coefficients = written(found, Format::Csv, TerminalLayout::default())?;
     let deviations = obsdeg_report::csv(found, Some("columns.deviations"))?;
     let mut files = vec![
         File { name: "coefficients.csv".into(), bytes: coefficients.into_bytes() },

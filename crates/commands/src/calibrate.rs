@@ -18,8 +18,9 @@ use obsdeg_evidence::acceptance::AcceptanceReport;
 use obsdeg_evidence::requirements::Requirements;
 use obsdeg_evidence::simulation::Conditions;
 use obsdeg_report::{
-    Answer, Document, File, Format, Layout, Origin, ReportError, ReviewFormat, Table, calibration_figures,
-    calibration_report, covariance_csv, residuals_csv, system_calibration_figures, system_residuals_csv,
+    Answer, Document, File, Format, Origin, ReportError, ReviewFormat, Table, TerminalLayout,
+    calibration_figures, calibration_report, covariance_csv, residuals_csv, system_calibration_figures,
+    system_residuals_csv,
 };
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +28,7 @@ use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
 use crate::conditions::{GyroNoiseOptions, RequirementOptions, within};
 use crate::host::Host;
 use crate::problem::{Kind, Problem};
-use crate::source::{Input, ModelFile, Named, Source};
+use crate::source::{Input, ModelWithText, Named, Source};
 
 /// Default number of starts.
 const STARTS: u32 = 16;
@@ -242,7 +243,7 @@ impl Calibrated {
     /// # Errors
     /// [`ReportError`] of a figure that cannot be drawn.
     pub fn files(&self, pictures: bool) -> Result<Vec<File>, ReportError> {
-        let coefficients = obsdeg_report::written(self, Format::Csv, Layout::default())?;
+        let coefficients = obsdeg_report::written(self, Format::Csv, TerminalLayout::default())?;
         let (covariance, residuals) = match self {
             Self::Platform(c) => (&c.covariance, residuals_csv(c)?),
             Self::Model(c) => (&c.covariance, system_residuals_csv(c)?),
@@ -320,7 +321,7 @@ pub fn calibrate(
 /// Calibrates a model from its only record.
 fn of_model(
     a: &Calibrate,
-    file: &ModelFile,
+    file: &ModelWithText,
     records: Vec<Record>,
     before: Option<&Source>,
     going: &dyn Fn(Going<'_>) -> bool,

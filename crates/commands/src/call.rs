@@ -2,8 +2,8 @@
 
 use obsdeg_calibration::record::Record;
 use obsdeg_report::{
-    Answer, Explanation, File, Format, Layout, ReviewFormat, csv, fragment, next_figures, picture_folder,
-    position_figure, sensor_figures, written,
+    Answer, Explanation, File, Format, ReviewFormat, TerminalLayout, csv, fragment, next_figures,
+    picture_folder, position_figure, sensor_figures, written,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -104,7 +104,7 @@ where
     }
 
     fn written(&self, format: Format) -> Result<String, Problem> {
-        Ok(written(&self.answer, format, Layout::default())?)
+        Ok(written(&self.answer, format, TerminalLayout::default())?)
     }
 
     fn table(&self, name: Option<&str>) -> Result<String, Problem> {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::arguments::{WORK, WordOr, check_whole, whole};
 use crate::host::{Host, Now};
 use crate::problem::Problem;
-use crate::source::{Input, ModelFile, Source};
+use crate::source::{Input, ModelWithText, Source};
 use crate::text;
 
 /// Largest orders of derivatives that a request may name.
@@ -133,7 +133,7 @@ fn candidates(a: &MeasureOptions, model: &SystemModel) -> Result<Vec<Candidate>,
     Ok(out)
 }
 
-fn wrong(file: &ModelFile, e: SensorError) -> Problem {
+fn wrong(file: &ModelWithText, e: SensorError) -> Problem {
     match e {
         SensorError::Model(e) => file.wrong(&e),
         SensorError::Interrupted => Problem::interrupted(),

@@ -26,7 +26,7 @@ pub enum Kind {
 
 /// Place in a text.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct TextPlace {
     /// Name of the text.
     pub name: String,
     /// The complete text.
@@ -35,7 +35,7 @@ pub struct Place {
     pub span: Range<usize>,
 }
 
-impl Place {
+impl TextPlace {
     /// Place whose range is clipped to the text.
     fn new(name: &str, text: &str, span: Range<usize>) -> Self {
         let end = span.end.min(text.len());
@@ -59,7 +59,7 @@ pub struct Problem {
     /// Message: place, expected, found.
     pub message: String,
     /// Place of the problem; `None` if it is not in a text.
-    pub place: Option<Place>,
+    pub place: Option<TextPlace>,
 }
 
 impl Problem {
@@ -80,7 +80,7 @@ impl Problem {
 
     /// Bad input at a place of a text.
     pub fn at(message: impl Into<String>, name: &str, text: &str, span: Range<usize>) -> Self {
-        Self { place: Some(Place::new(name, text, span)), ..Self::input(message) }
+        Self { place: Some(TextPlace::new(name, text, span)), ..Self::input(message) }
     }
 
     /// The problem with the name of its scheme before the message.

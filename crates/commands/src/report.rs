@@ -16,7 +16,7 @@ use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
 use crate::conditions::{ConditionOptions, RUNS};
 use crate::host::{Host, Now};
 use crate::problem::Problem;
-use crate::source::{Input, ModelFile, Named, Source, title};
+use crate::source::{Input, ModelWithText, Named, Source, title};
 
 /// Request of `report`: assumptions, conditions and number of Monte Carlo runs.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
@@ -112,7 +112,7 @@ pub fn report(
     check_whole("--runs", a.runs, &RUNS)?;
     a.given.concern(&read)?;
     let mut entries: Vec<Entry> = Vec::new();
-    let mut files: Vec<ModelFile> = Vec::new();
+    let mut files: Vec<ModelWithText> = Vec::new();
     for (name, input) in read {
         match input {
             Input::Model(file) => files.push(*file),

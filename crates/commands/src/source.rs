@@ -43,7 +43,7 @@ pub enum Input {
     /// Torquing scheme.
     Scheme(Box<Scheme>),
     /// Any system.
-    Model(Box<ModelFile>),
+    Model(Box<ModelWithText>),
 }
 
 /// Input with its name, which is empty for angles of the command line.
@@ -51,13 +51,13 @@ pub type Named = (String, Input);
 
 /// Model with the text that it was read from.
 #[derive(Debug, Clone)]
-pub struct ModelFile {
+pub struct ModelWithText {
     /// The model.
     pub model: SystemModel,
     source: Source,
 }
 
-impl ModelFile {
+impl ModelWithText {
     /// Problem of a model's error, with its place in the text.
     pub fn wrong(&self, e: &ModelError) -> Problem {
         self.source.wrong(&e.to_string(), e.span.clone())
@@ -108,10 +108,10 @@ impl Source {
     }
 
     /// Reads the model in the text.
-    fn model(self) -> Result<ModelFile, Problem> {
+    fn model(self) -> Result<ModelWithText, Problem> {
         let read = if self.is_json() { json::read(&self.text) } else { model_file::read(&self.text) };
         match read {
-            Ok(model) => Ok(ModelFile { model, source: self }),
+            Ok(model) => Ok(ModelWithText { model, source: self }),
             Err(_) if scheme_file::is_scheme(&self.text) => Err(Problem::input(format!(
                 "{} is a scheme file; expected a model file, with [states] and [outputs]",
                 self.name

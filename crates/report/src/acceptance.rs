@@ -2,7 +2,7 @@
 
 use obsdeg_evidence::acceptance::{AcceptanceLimit, AcceptanceReport, Decision};
 
-use crate::document::{Block, Cell, Grade, estimate, left, number, optional, right, short};
+use crate::document::{DocumentBlock, Grade, TableCell, estimate, left, number, optional, right, short};
 use crate::words::names;
 
 /// Decision in a word.
@@ -23,7 +23,7 @@ fn grade(d: Decision) -> Grade {
 }
 
 /// Table of the limits with their guard bands. Before a run estimate and decision are blank.
-pub(crate) fn table(heading: &str, a: &AcceptanceReport) -> Block {
+pub(crate) fn table(heading: &str, a: &AcceptanceReport) -> DocumentBlock {
     let filled = a.limits.iter().any(|l| l.decision.is_some());
     let uncertainty = if filled { "uncertainty" } else { "predicted uncertainty" };
     let columns = [
@@ -39,14 +39,17 @@ pub(crate) fn table(heading: &str, a: &AcceptanceReport) -> Block {
     let ends = |of: Option<[f64; 2]>| {
         of.map_or_else(|| "none".into(), |[a, b]| format!("{}, {}", number(a), number(b)))
     };
-    let row = |l: &AcceptanceLimit| -> Vec<Cell> {
+    let row = |l: &AcceptanceLimit| -> Vec<TableCell> {
         let (value, decision) = match l.decision {
             Some(d) => {
                 let why = if l.by_prior { " (prior alone)" } else { "" };
-                (estimate(l.estimate, l.uncertainty), Cell::graded(format!("{}{why}", word(d)), grade(d)))
+                (
+                    estimate(l.estimate, l.uncertainty),
+                    TableCell::graded(format!("{}{why}", word(d)), grade(d)),
+                )
             }
-            None if l.by_prior => (String::new(), Cell::from("undecided (prior alone)")),
-            None => (String::new(), Cell::from("")),
+            None if l.by_prior => (String::new(), TableCell::from("undecided (prior alone)")),
+            None => (String::new(), TableCell::from("")),
         };
         let texts = [
             l.name.clone(),
@@ -57,9 +60,9 @@ pub(crate) fn table(heading: &str, a: &AcceptanceReport) -> Block {
             ends(l.rejected_beyond),
             value,
         ];
-        texts.into_iter().map(Cell::from).chain([decision]).collect()
+        texts.into_iter().map(TableCell::from).chain([decision]).collect()
     };
-    Block::table(heading, columns, a.limits.iter().map(row))
+    DocumentBlock::table(heading, columns, a.limits.iter().map(row))
 }
 
 /// Rule of the decision, in sentences.

@@ -6,10 +6,10 @@ use obsdeg_core::solution::Formula;
 
 use obsdeg_evidence::simulation::SchemeAnalysis;
 
-use crate::document::{Block, Cell, Column, Document, Typeset, left, right, short};
+use crate::document::{Document, DocumentBlock, TableCell, TableColumn, Typeset, left, right, short};
 use crate::{Answer, Explanation, gimbals, latex, omitted, resolve, stated, why, words};
 
-fn positions(positions: &[PositionReport]) -> Block {
+fn positions(positions: &[PositionReport]) -> DocumentBlock {
     let turned = positions.iter().any(|p| !p.turns.is_empty());
     let turns = |p: &PositionReport| p.turns.iter().map(words::turn).collect::<Vec<_>>().join(", ");
     let row = |p: &PositionReport| {
@@ -29,21 +29,21 @@ fn positions(positions: &[PositionReport]) -> Block {
         left("g in x, y, z [g]"),
     ];
     columns.extend(turned.then(|| left("reached by")));
-    Block::table("", columns, positions.iter().map(row))
+    DocumentBlock::table("", columns, positions.iter().map(row))
 }
 
 /// Cell with a name or an expression in program notation, and its LaTeX.
-fn expression(text: &str) -> Cell {
-    Cell::formula(text, latex::expression(text))
+fn expression(text: &str) -> TableCell {
+    TableCell::formula(text, latex::expression(text))
 }
 
 /// Tables of the unknowns and of the combinations: name, verdict, solution.
-fn verdicts(a: &Analysis) -> [Block; 2] {
+fn verdicts(a: &Analysis) -> [DocumentBlock; 2] {
     let dwell = words::dwell_matters(a).then(|| left("with dwell"));
-    let columns = |first: &[Column], last| {
+    let columns = |first: &[TableColumn], last| {
         [first, &[left("status"), right("degree")], dwell.as_slice(), &[left(last)]].concat()
     };
-    let row = |first: Vec<Cell>, status: Status, degree, order, last: Cell| {
+    let row = |first: Vec<TableCell>, status: Status, degree, order, last: TableCell| {
         let dwell = dwell.is_some().then(|| words::with_dwell(a, degree, order).into());
         [
             first,
@@ -54,7 +54,7 @@ fn verdicts(a: &Analysis) -> [Block; 2] {
         .concat()
     };
     let solved = |s: &Option<Solution>, otherwise: String| match s {
-        Some(s) => Cell::formula(&s.text, latex::solution(s, a.frame, &a.stations)),
+        Some(s) => TableCell::formula(&s.text, latex::solution(s, a.frame, &a.stations)),
         None => otherwise.into(),
     };
     let unknowns = a.quantities.iter().map(|q| {
@@ -64,16 +64,16 @@ fn verdicts(a: &Analysis) -> [Block; 2] {
     let combinations = words::combinations(a).map(|c| {
         let asked = if c.requested { " (asked for)" } else { "" };
         let name = expression(&c.expression);
-        let name = Cell { text: format!("{}{asked}", c.expression), ..name };
+        let name = TableCell { text: format!("{}{asked}", c.expression), ..name };
         row(vec![name], c.status, c.degree, c.accuracy_order, solved(&c.solution, String::new()))
     });
     [
-        Block::table(
+        DocumentBlock::table(
             "Unknowns",
             columns(&[left("unknown"), left("unit")], "solution, or why there is none"),
             unknowns,
         ),
-        Block::table(
+        DocumentBlock::table(
             "Observable combinations (and those asked for)",
             columns(&[left("combination")], "solution"),
             combinations,
@@ -100,7 +100,7 @@ fn formula(f: &Formula) -> Typeset {
 }
 
 /// The degenerate angles, and the reason why some may be missing.
-fn degenerate_angles(a: &Analysis) -> Option<Block> {
+fn degenerate_angles(a: &Analysis) -> Option<DocumentBlock> {
     let mut lines: Vec<String> = a.degenerate_loci.iter().flatten().map(words::locus).collect();
     lines.extend(a.degenerate_loci.as_ref().map(|loci| words::loci(loci)));
     let incomplete = a.degenerate_loci_incomplete.as_ref();
@@ -109,7 +109,7 @@ fn degenerate_angles(a: &Analysis) -> Option<Block> {
         Some(_) => "Degenerate angles (the list may lack some)",
         None => "Degenerate angles",
     };
-    Block::list_if_any(heading, lines)
+    DocumentBlock::list_if_any(heading, lines)
 }
 
 impl Answer for SchemeAnalysis {
@@ -121,7 +121,7 @@ impl Answer for SchemeAnalysis {
         let mut out = self.verdicts.document();
         let Some(s) = &self.sensitivities else { return out };
         out.blocks.extend(omitted::blocks(&s.effects, ""));
-        out.blocks.push(Block::list(
+        out.blocks.push(DocumentBlock::list(
             "Sensitivities: the record that weights the samples",
             stated::measurement(&s.conditions),
         ));
@@ -152,25 +152,29 @@ impl Answer for Analysis {
         blocks.extend(why::blocks(&self.why));
         blocks.push(unknowns);
         blocks.extend((!self.combinations.is_empty()).then_some(combinations));
-        blocks.extend(Block::list_if_any(words::ACCURACY, words::accuracy(self)));
-        blocks.extend(Block::formulas(
+        blocks.extend(DocumentBlock::list_if_any(words::ACCURACY, words::accuracy(self)));
+        blocks.extend(DocumentBlock::formulas(
             format!("{} (a change along one leaves them as they are)", words::UNSEEN),
             self.null_space.iter().map(|v| null_vector(v)),
         ));
         let silent = words::not_excited(self);
         let silent = (!silent.is_empty()).then(|| silent.join(", "));
-        blocks.extend(Block::list_if_any("Not excited (never moves Z)", Vec::from_iter(silent)));
+        blocks.extend(DocumentBlock::list_if_any("Not excited (never moves Z)", Vec::from_iter(silent)));
         blocks.extend(degenerate_angles(self));
-        blocks.extend(Block::formulas(
+        blocks.extend(DocumentBlock::formulas(
             "Z in n, and psi, eps in n at each position",
             self.formulas.iter().flatten().map(formula),
         ));
-        blocks.extend(Block::list_if_any("Under the other carries", words::carries(self)));
-        blocks.extend(self.omitted.as_ref().map(|o| Block::list("Not estimated", omitted::classes(o))));
+        blocks.extend(DocumentBlock::list_if_any("Under the other carries", words::carries(self)));
+        blocks
+            .extend(self.omitted.as_ref().map(|o| DocumentBlock::list("Not estimated", omitted::classes(o))));
         blocks.extend(gimbals::block(self.gimbals.as_ref()));
-        blocks.push(Block::list("Assumed", words::assumptions(self)));
+        blocks.push(DocumentBlock::list("Assumed", words::assumptions(self)));
         let notes = self.notes.iter().map(|n| format!("note: {n}"));
-        blocks.push(Block::list("Certainty", std::iter::once(words::certainty(self)).chain(notes).collect()));
+        blocks.push(DocumentBlock::list(
+            "Certainty",
+            std::iter::once(words::certainty(self)).chain(notes).collect(),
+        ));
         Document {
             title: format!("Observable degrees: {}", words::headline(self)),
             lead: (self.sentences().into_iter())

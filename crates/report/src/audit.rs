@@ -3,7 +3,7 @@
 use obsdeg_evidence::audit::{Audit, Finding};
 
 use crate::Answer;
-use crate::document::{Block, Document, left};
+use crate::document::{Document, DocumentBlock, left};
 
 fn word(f: Finding) -> &'static str {
     match f {
@@ -28,7 +28,7 @@ impl Answer for Audit {
         Document {
             title: format!("The paper against the algebra: {counts} (recomputed with seed {})", self.seed),
             lead: Vec::new(),
-            blocks: vec![Block::table("", columns, rows)],
+            blocks: vec![DocumentBlock::table("", columns, rows)],
         }
     }
 

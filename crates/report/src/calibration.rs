@@ -6,7 +6,7 @@ use obsdeg_calibration::answer::{
 };
 
 use crate::calibration_findings::{clock, finding};
-use crate::document::{Block, Document, estimate, left, number, optional, right};
+use crate::document::{Document, DocumentBlock, estimate, left, number, optional, right};
 use crate::{Answer, ReportError, Table, acceptance, omitted, stated, words};
 
 /// Largest number of listed outliers.
@@ -428,7 +428,7 @@ fn lead(c: &Calibration) -> Vec<String> {
 }
 
 /// Tables of the estimates of unknowns and of combinations.
-fn estimates(c: &Calibration) -> Vec<Block> {
+fn estimates(c: &Calibration) -> Vec<DocumentBlock> {
     let totals = c.quantities.iter().any(|e| e.total.is_some());
     let mut columns = vec![
         left("unknown"),
@@ -447,10 +447,10 @@ fn estimates(c: &Calibration) -> Vec<Block> {
          where none is stated)"
     );
     let mut blocks =
-        vec![Block::table(heading, columns.clone(), c.quantities.iter().map(|e| row(e, totals)))];
+        vec![DocumentBlock::table(heading, columns.clone(), c.quantities.iter().map(|e| row(e, totals)))];
     if !c.combinations.is_empty() {
         let rows = c.combinations.iter().map(|e| row(e, totals));
-        blocks.push(Block::table(
+        blocks.push(DocumentBlock::table(
             "Combinations of what is not told apart, and those asked for",
             columns,
             rows,
@@ -460,7 +460,7 @@ fn estimates(c: &Calibration) -> Vec<Block> {
 }
 
 /// Table of the positions of all records.
-fn positions(c: &Calibration) -> Block {
+fn positions(c: &Calibration) -> DocumentBlock {
     let each = c.positions.len() / c.records.len().max(1);
     let force = c.positions.iter().any(|p| p.force_g.is_some());
     let mut columns = vec![
@@ -476,7 +476,7 @@ fn positions(c: &Calibration) -> Block {
     if !force {
         columns.remove(FORCE);
     }
-    Block::table(
+    DocumentBlock::table(
         "Positions (times of the record; chi-square per degree of freedom)",
         columns,
         c.positions
@@ -487,7 +487,7 @@ fn positions(c: &Calibration) -> Block {
 }
 
 /// Table of the components of Z.
-fn channels(c: &Calibration) -> Block {
+fn channels(c: &Calibration) -> DocumentBlock {
     let columns = [
         left("component"),
         left("unit"),
@@ -509,7 +509,7 @@ fn channels(c: &Calibration) -> Block {
                 .map_or_else(|| "-".into(), |w| format!("{:+.2} ({})", w.correlation, number(w.probability))),
         ]
     });
-    Block::table(
+    DocumentBlock::table(
         "Components of Z (sigma: of a sample, as used; scatter: of samples within a bin; whiteness: \
          probability of correlations like these; temperature: correlation with it, and the probability \
          of that)",
@@ -519,7 +519,7 @@ fn channels(c: &Calibration) -> Block {
 }
 
 /// Table of the first outliers; `None` without any.
-fn outliers(c: &Calibration) -> Option<Block> {
+fn outliers(c: &Calibration) -> Option<DocumentBlock> {
     if c.outliers.is_empty() {
         return None;
     }
@@ -532,7 +532,7 @@ fn outliers(c: &Calibration) -> Option<Block> {
         n if n > LISTED => format!("Left out as outliers: {n}, of which the first {LISTED}"),
         n => format!("Left out as outliers: {n}"),
     };
-    Some(Block::table(heading, columns, rows))
+    Some(DocumentBlock::table(heading, columns, rows))
 }
 
 impl Answer for Calibration {
@@ -544,17 +544,17 @@ impl Answer for Calibration {
         let mut blocks = estimates(self);
         if let Some(a) = &self.acceptance {
             blocks.push(acceptance::table("Acceptance", a));
-            blocks.push(Block::list("Decision rule", acceptance::rule(a)));
+            blocks.push(DocumentBlock::list("Decision rule", acceptance::rule(a)));
         }
-        blocks.push(Block::list("Mode", mode(self)));
-        blocks.push(Block::list("Fit", fit(self)));
-        blocks.extend(Block::list_if_any("Next runs", next_runs(&self.next_runs)));
-        blocks.push(Block::list("Not estimated", omitted::calibration(&self.omitted)));
+        blocks.push(DocumentBlock::list("Mode", mode(self)));
+        blocks.push(DocumentBlock::list("Fit", fit(self)));
+        blocks.extend(DocumentBlock::list_if_any("Next runs", next_runs(&self.next_runs)));
+        blocks.push(DocumentBlock::list("Not estimated", omitted::calibration(&self.omitted)));
         blocks.push(positions(self));
         blocks.push(channels(self));
         blocks.extend(outliers(self));
-        blocks.push(Block::list("Read", records(self)));
-        blocks.push(Block::list("Assumed", assumed(self)));
+        blocks.push(DocumentBlock::list("Read", records(self)));
+        blocks.push(DocumentBlock::list("Assumed", assumed(self)));
         let count = self.records.len();
         Document {
             title: format!("Calibration from {count} record{}", if count == 1 { "" } else { "s" }),

@@ -4,7 +4,7 @@
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Estimated, PositionFit, ResidualSeries};
 
-use crate::figure::{BLACK, BLUE, Band, Figure, FigureError, GREEN, Line, ORANGE, SKY, Stroke, grid};
+use crate::figure::{BLACK, BLUE, Band, Curve, Figure, FigureError, GREEN, ORANGE, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 
 /// Name of a record without its folder.
@@ -140,7 +140,7 @@ pub(crate) fn estimate_figures(c: &Calibration) -> Vec<Figure> {
 type BarSeries = (&'static str, &'static str, Stroke, f64, fn(&Estimated) -> Option<f64>);
 
 /// A bar from `low` to `high` at `at`, with ends.
-fn bar(label: &str, color: &'static str, stroke: Stroke, at: f64, [low, high]: [f64; 2]) -> Line {
+fn bar(label: &str, color: &'static str, stroke: Stroke, at: f64, [low, high]: [f64; 2]) -> Curve {
     let points =
         [(at - 0.08, low), (at + 0.08, low), (at, low), (at, high), (at - 0.08, high), (at + 0.08, high)];
     line(label, color, stroke, points.to_vec())

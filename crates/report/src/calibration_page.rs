@@ -4,7 +4,7 @@
 use obsdeg_calibration::{Basis, Calibration, CalibrationChange, compared};
 
 use crate::calibration_figures::file_name;
-use crate::document::{Block, Cell, Document, Grade, estimate, left, number, optional, right};
+use crate::document::{Document, DocumentBlock, Grade, TableCell, estimate, left, number, optional, right};
 use crate::review::calibrated::{Pictures, answers, pictures, status};
 use crate::review::{answers, title};
 use crate::words::{self, names};
@@ -21,34 +21,35 @@ pub(crate) fn document(calibrations: &[(String, Calibration)], origin: &Origin) 
         return Document { title: String::new(), lead: Vec::new(), blocks: Vec::new() };
     };
     let scheme = c.name.as_str();
-    let mut blocks = vec![title::of_one(&c.document, scheme), Block::Text(made(c, origin))];
+    let mut blocks = vec![title::of_one(&c.document, scheme), DocumentBlock::Text(made(c, origin))];
     let named = if name.is_empty() { "Calibration".into() } else { format!("Calibration {name}") };
-    blocks.push(Block::Status(vec![status(c, named)]));
+    blocks.push(DocumentBlock::Status(vec![status(c, named)]));
     blocks.extend(answers::tables(&[answers(name, c)]));
     blocks.push(coefficients(c, before.first().map(|b| &b.1)));
     if let Some(a) = &c.acceptance {
         blocks.push(acceptance::table("Acceptance", a));
-        blocks.push(Block::list("Decision rule", acceptance::rule(a)));
+        blocks.push(DocumentBlock::list("Decision rule", acceptance::rule(a)));
     }
     for (earlier, b) in before {
         blocks.extend(changes(&compared(c, b), earlier));
     }
-    blocks.push(Block::NewPage);
+    blocks.push(DocumentBlock::NewPage);
     let Document { lead, blocks: own, .. } = c.document();
-    blocks.push(Block::Section { level: 1, title: "Fit and findings".into() });
-    blocks.extend(lead.into_iter().map(Block::Text));
-    let (mut front, mut rest): (Vec<Block>, Vec<Block>) = own.into_iter().partition(is_of_the_fit);
+    blocks.push(DocumentBlock::Section { level: 1, title: "Fit and findings".into() });
+    blocks.extend(lead.into_iter().map(DocumentBlock::Text));
+    let (mut front, mut rest): (Vec<DocumentBlock>, Vec<DocumentBlock>) =
+        own.into_iter().partition(is_of_the_fit);
     rest.retain(|b| !is_named(b, "Acceptance") && !is_named(b, "Decision rule"));
     let Pictures { estimates, residuals, details } = pictures(c, "c1");
     front.extend(residuals);
     blocks.extend(front);
-    blocks.push(Block::Section { level: 1, title: "Uncertainty".into() });
+    blocks.push(DocumentBlock::Section { level: 1, title: "Uncertainty".into() });
     blocks.push(budget(c));
-    blocks.push(Block::Text(PREDICTED.into()));
+    blocks.push(DocumentBlock::Text(PREDICTED.into()));
     blocks.extend(estimates);
     rest.extend(details);
-    blocks.push(Block::fold(1, "Details", rest));
-    blocks.push(Block::fold(1, "About this report", title::about(&c.version, origin)));
+    blocks.push(DocumentBlock::fold(1, "Details", rest));
+    blocks.push(DocumentBlock::fold(1, "About this report", title::about(&c.version, origin)));
     let of = match (scheme.is_empty(), name.is_empty()) {
         (true, true) => c.records.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", "),
         (true, false) => name.clone(),
@@ -77,19 +78,21 @@ const PREDICTED: &str = "Predicted sigmas are those of the linear model at the t
                          where the record has more samples or other noise, the two differ by the root of \
                          their ratio.";
 
-fn is_named(b: &Block, name: &str) -> bool {
+fn is_named(b: &DocumentBlock, name: &str) -> bool {
     match b {
-        Block::Table { heading, .. } | Block::List { heading, .. } => heading.starts_with(name),
+        DocumentBlock::Table { heading, .. } | DocumentBlock::List { heading, .. } => {
+            heading.starts_with(name)
+        }
         _ => false,
     }
 }
 
-fn is_of_the_fit(b: &Block) -> bool {
+fn is_of_the_fit(b: &DocumentBlock) -> bool {
     ["Fit", "Next runs", "Positions"].iter().any(|name| is_named(b, name))
 }
 
 /// Coefficients with what decides about them; psi is that of the start of a record.
-fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
+fn coefficients(c: &Calibration, before: Option<&Calibration>) -> DocumentBlock {
     let mut columns = vec![
         left("coefficient"),
         left("unit"),
@@ -105,10 +108,12 @@ fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
         let u = e.uncertainty();
         let margin = u.zip(e.required_sigma).map(|(u, r)| r / u);
         let margin = match margin {
-            Some(m) if e.from_prior => Cell::graded(format!("{} (prior alone)", number(m)), Grade::Limited),
-            Some(m) => Cell::graded(number(m), if m >= 1.0 { Grade::Good } else { Grade::Missed }),
-            None if e.required_sigma.is_some() => Cell::graded("not determined", Grade::Missed),
-            None => Cell::from("-"),
+            Some(m) if e.from_prior => {
+                TableCell::graded(format!("{} (prior alone)", number(m)), Grade::Limited)
+            }
+            Some(m) => TableCell::graded(number(m), if m >= 1.0 { Grade::Good } else { Grade::Missed }),
+            None if e.required_sigma.is_some() => TableCell::graded("not determined", Grade::Missed),
+            None => TableCell::from("-"),
         };
         let ratio = e.larger_sigma().zip(e.predicted_sigma).map(|(s, p)| s / p);
         let texts = [
@@ -118,20 +123,22 @@ fn coefficients(c: &Calibration, before: Option<&Calibration>) -> Block {
             optional(u),
             optional(e.required_sigma),
         ];
-        let mut row: Vec<Cell> = texts.into_iter().map(Cell::from).collect();
+        let mut row: Vec<TableCell> = texts.into_iter().map(TableCell::from).collect();
         row.push(margin);
-        row.extend([optional(e.predicted_sigma), optional(ratio)].map(Cell::from));
+        row.extend([optional(e.predicted_sigma), optional(ratio)].map(TableCell::from));
         if let Some(b) = before {
             let own = b.quantities.iter().find(|q| q.name == e.name);
-            row.push(Cell::from(own.map_or_else(|| "-".into(), |q| estimate(q.estimate, q.uncertainty()))));
+            row.push(TableCell::from(
+                own.map_or_else(|| "-".into(), |q| estimate(q.estimate, q.uncertainty())),
+            ));
         }
         row
     });
-    Block::table("Coefficients", columns, rows)
+    DocumentBlock::table("Coefficients", columns, rows)
 }
 
 /// Budget of the uncertainty of each coefficient.
-fn budget(c: &Calibration) -> Block {
+fn budget(c: &Calibration) -> DocumentBlock {
     let columns = [
         left("coefficient"),
         left("unit"),
@@ -146,7 +153,7 @@ fn budget(c: &Calibration) -> Block {
         let numbers = [e.sigma, e.sigma_rescaled, e.outside(), e.uncertainty(), used].map(optional);
         [vec![e.name.clone(), e.unit.clone()], numbers.to_vec()].concat()
     });
-    Block::table(
+    DocumentBlock::table(
         "Budget (root sum of squares: the larger sigma, and the errors outside the model)",
         columns,
         rows,
@@ -154,13 +161,14 @@ fn budget(c: &Calibration) -> Block {
 }
 
 /// Changes since an earlier calibration.
-fn changes(change: &CalibrationChange, earlier: &str) -> Vec<Block> {
-    let texts = significance(change).into_iter().map(|s| Block::Text(format!("{}.", stated::capital(&s))));
+fn changes(change: &CalibrationChange, earlier: &str) -> Vec<DocumentBlock> {
+    let texts =
+        significance(change).into_iter().map(|s| DocumentBlock::Text(format!("{}.", stated::capital(&s))));
     std::iter::once(changed_coefficients(change, earlier)).chain(texts).collect()
 }
 
 /// Table of the coefficients with their changes.
-fn changed_coefficients(change: &CalibrationChange, earlier: &str) -> Block {
+fn changed_coefficients(change: &CalibrationChange, earlier: &str) -> DocumentBlock {
     let independent = change.shared.is_empty() && change.consistent;
     let columns = [
         left("coefficient"),
@@ -173,9 +181,9 @@ fn changed_coefficients(change: &CalibrationChange, earlier: &str) -> Block {
     let rows = change.coefficients.iter().map(|k| {
         let in_sigma = k.change / k.sigma;
         let marked = match (independent, in_sigma.abs() < MARKED) {
-            (true, true) => Cell::graded(number(in_sigma), Grade::Good),
-            (true, false) => Cell::graded(number(in_sigma), Grade::Limited),
-            (false, _) => Cell::from("-"),
+            (true, true) => TableCell::graded(number(in_sigma), Grade::Good),
+            (true, false) => TableCell::graded(number(in_sigma), Grade::Limited),
+            (false, _) => TableCell::from("-"),
         };
         let sigma = if independent { number(k.sigma) } else { "-".into() };
         let texts = [
@@ -185,9 +193,9 @@ fn changed_coefficients(change: &CalibrationChange, earlier: &str) -> Block {
             estimate(Some(k.change), Some(k.sigma)),
             sigma,
         ];
-        texts.into_iter().map(Cell::from).chain([marked]).collect::<Vec<_>>()
+        texts.into_iter().map(TableCell::from).chain([marked]).collect::<Vec<_>>()
     });
-    Block::table(format!("Changes since {earlier}"), columns, rows)
+    DocumentBlock::table(format!("Changes since {earlier}"), columns, rows)
 }
 
 /// Sentences on the significance of the changes.

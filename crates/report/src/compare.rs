@@ -4,7 +4,7 @@ use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity};
 use obsdeg_evidence::requirements::{Requirements, Worst};
 use obsdeg_evidence::simulation::CoefficientFloor;
 
-use crate::document::{Block, Document, left, number, optional, right};
+use crate::document::{Document, DocumentBlock, left, number, optional, right};
 use crate::{Answer, gimbals, omitted, resolve, stated, words};
 
 pub(crate) fn worst(w: Option<&Worst>) -> String {
@@ -41,7 +41,7 @@ pub(crate) const REQUIREMENTS: [&str; 4] =
     ["requirements; worst margin", "met without", "required", "margin"];
 
 /// One row per scheme.
-fn overview(schemes: &[ComparedScheme]) -> Block {
+fn overview(schemes: &[ComparedScheme]) -> DocumentBlock {
     let row = |r: &ComparedScheme| {
         let without = |keeps: fn(&&DropOne) -> bool| {
             let kept: Vec<String> = r.drop_one.iter().filter(keeps).map(|d| d.position.clone()).collect();
@@ -59,7 +59,7 @@ fn overview(schemes: &[ComparedScheme]) -> Block {
             without(|d| d.requirements.stated > 0 && d.requirements.all_met()),
         ]
     };
-    Block::table(
+    DocumentBlock::table(
         format!("Side by side ({})", stated::predicted_of(schemes.iter().map(|r| &r.conditions))),
         [
             left("scheme"),
@@ -98,7 +98,7 @@ pub(crate) fn unknowns(schemes: &[ComparedScheme]) -> Vec<&Quantity> {
 }
 
 /// Schemes as columns: what decides a requirement, and its ratio to that of the first scheme.
-pub(crate) fn ratios(schemes: &[ComparedScheme]) -> Block {
+pub(crate) fn ratios(schemes: &[ComparedScheme]) -> DocumentBlock {
     let all = unknowns(schemes);
     let judged = all.iter().any(|q| q.requirement.is_some());
     let mut columns = vec![left("unknown"), left("unit")];
@@ -130,11 +130,15 @@ pub(crate) fn ratios(schemes: &[ComparedScheme]) -> Block {
     let bench = schemes.iter().any(|s| s.conditions.bench.is_some());
     let what = if bench { "Predicted sigma, with a bench the total uncertainty" } else { "Predicted sigma" };
     let ratio = if schemes.len() > 1 { ", and in brackets its ratio to the first scheme" } else { "" };
-    Block::table(format!("{what}{ratio} (- where it is not determined)"), columns, all.into_iter().map(row))
+    DocumentBlock::table(
+        format!("{what}{ratio} (- where it is not determined)"),
+        columns,
+        all.into_iter().map(row),
+    )
 }
 
 /// One row per unknown: degree, accuracy order and sigma in every scheme.
-fn by_unknown(schemes: &[ComparedScheme]) -> Block {
+fn by_unknown(schemes: &[ComparedScheme]) -> DocumentBlock {
     let mut names: Vec<&String> = Vec::new();
     for q in schemes.iter().flat_map(|r| &r.quantities) {
         if !names.contains(&&q.name) {
@@ -180,7 +184,7 @@ fn by_unknown(schemes: &[ComparedScheme]) -> Block {
         "margin: required over sigma"
     };
     let predicted = stated::predicted_of(schemes.iter().map(|r| &r.conditions));
-    Block::table(format!("By unknown ({predicted}; {margin})"), columns, rows)
+    DocumentBlock::table(format!("By unknown ({predicted}; {margin})"), columns, rows)
 }
 
 /// `; half turns to p2 about -N, to p3 about N`.
@@ -202,7 +206,7 @@ fn excitation(q: &Quantity) -> String {
 
 /// Predicted sigmas beside those of full attitudes, if the small-angle model does not hold at the scheme's
 /// own drifts.
-pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
+pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<DocumentBlock> {
     let large = || schemes.iter().filter(|r| r.validity.as_ref().is_some_and(|v| !v.holds));
     let rows = large().flat_map(|r| {
         let shown = r.quantities.iter().filter(|q| q.sigma_extended.is_some());
@@ -229,8 +233,8 @@ pub(crate) fn at_own_drifts(schemes: &[ComparedScheme]) -> Vec<Block> {
                  along the run of the drifts that are stated; an unknown that is not determined at small \
                  angles may be seen by large ones";
     vec![
-        Block::table("Sigma at the drifts that are stated", columns, rows),
-        Block::list(
+        DocumentBlock::table("Sigma at the drifts that are stated", columns, rows),
+        DocumentBlock::list(
             "Validity of the small-angle model",
             large().filter_map(reached).chain([means.into()]).collect(),
         ),
@@ -287,7 +291,7 @@ fn assumed(r: &ComparedScheme) -> String {
 }
 
 /// One row per scheme and position that is left out.
-fn without_one_position(schemes: &[ComparedScheme]) -> Block {
+fn without_one_position(schemes: &[ComparedScheme]) -> DocumentBlock {
     let drop_rows = schemes.iter().flat_map(|r| {
         r.drop_one.iter().map(|d| {
             vec![
@@ -301,11 +305,11 @@ fn without_one_position(schemes: &[ComparedScheme]) -> Block {
     });
     let figure = worst_heading(has_bench(schemes));
     let columns = ["scheme", "without", "not observable any more", figure, REQUIREMENTS[0]].map(left);
-    Block::table("Without one position", columns, drop_rows)
+    DocumentBlock::table("Without one position", columns, drop_rows)
 }
 
 /// One row per condition and scheme: rank and worst sigma under the condition.
-fn sensitivity(schemes: &[ComparedScheme]) -> Block {
+fn sensitivity(schemes: &[ComparedScheme]) -> DocumentBlock {
     let figure = worst_heading(has_bench(schemes));
     let conditions = schemes.first().map_or(&[][..], |r| &r.sensitivity);
     let mut names: Vec<&String> = conditions.iter().map(|s| &s.condition).collect();
@@ -327,7 +331,7 @@ fn sensitivity(schemes: &[ComparedScheme]) -> Block {
             }
         }
     }
-    Block::table(
+    DocumentBlock::table(
         format!("Sensitivity of the {figure}"),
         [left("condition"), left("scheme"), right("rank with dwell"), left(figure)],
         rows,
@@ -335,7 +339,7 @@ fn sensitivity(schemes: &[ComparedScheme]) -> Block {
 }
 
 /// Noise floor of the coefficients in every scheme, with its meaning; empty if no scheme has one.
-fn noise_floor(schemes: &[ComparedScheme]) -> Vec<Block> {
+fn noise_floor(schemes: &[ComparedScheme]) -> Vec<DocumentBlock> {
     let floors = || schemes.iter().filter_map(|r| Some((r, r.noise_floor.as_ref()?)));
     if floors().next().is_none() {
         return Vec::new();
@@ -358,7 +362,10 @@ fn noise_floor(schemes: &[ComparedScheme]) -> Vec<Block> {
     }
     let own = floors().map(|(r, f)| format!("{}: {}", r.name, words::floor_of(f).join("; ")));
     let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
-    vec![Block::table("Noise floor", columns, rows), Block::list("Noise floor: what it is", means.collect())]
+    vec![
+        DocumentBlock::table("Noise floor", columns, rows),
+        DocumentBlock::list("Noise floor: what it is", means.collect()),
+    ]
 }
 
 /// Meaning of the columns, one sentence each.
@@ -396,7 +403,7 @@ impl Answer for Comparison {
         let first = vec![
             overview(schemes).without(left_out),
             ratios(schemes),
-            Block::list("Assumed", schemes.iter().map(assumed).collect()),
+            DocumentBlock::list("Assumed", schemes.iter().map(assumed).collect()),
         ];
         let mut blocks = vec![by_unknown(schemes).without(left_out)];
         blocks.extend(at_own_drifts(schemes));
@@ -409,18 +416,18 @@ impl Answer for Comparison {
         blocks.extend(noise_floor(schemes));
         for r in schemes {
             let lines = gimbals::lines(r.gimbals.as_ref());
-            blocks.extend(Block::list_if_any(format!("Gimbals of {}", r.name), lines));
+            blocks.extend(DocumentBlock::list_if_any(format!("Gimbals of {}", r.name), lines));
         }
         let missed = |r: &ComparedScheme| format!("{}: {}", r.name, stated::requirements(&r.requirements));
         if judged {
-            blocks.push(Block::list("Requirements", schemes.iter().map(missed).collect()));
+            blocks.push(DocumentBlock::list("Requirements", schemes.iter().map(missed).collect()));
         }
-        blocks.push(Block::list("Meaning of the columns", meaning(self)));
+        blocks.push(DocumentBlock::list("Meaning of the columns", meaning(self)));
         let n = schemes.len();
         Document {
             title: format!("Comparison of {n} scheme{}", if n == 1 { "" } else { "s" }),
             lead: lead(self),
-            blocks: first.into_iter().chain(Block::details(1, "Details", blocks)).collect(),
+            blocks: first.into_iter().chain(DocumentBlock::details(1, "Details", blocks)).collect(),
         }
     }
 

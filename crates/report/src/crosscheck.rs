@@ -7,7 +7,7 @@ use obsdeg_evidence::crosscheck::{
 };
 
 use crate::Answer;
-use crate::document::{Block, Document, left, number, optional, right};
+use crate::document::{Document, DocumentBlock, left, number, optional, right};
 use crate::simulation::{conditions, validity, warning};
 use crate::words::{self, at_most, band};
 
@@ -39,7 +39,7 @@ fn measured(c: &Check) -> String {
 }
 
 /// Item a without dwells, unknown by unknown.
-fn by_derivatives(c: &CrossCheck) -> Block {
+fn by_derivatives(c: &CrossCheck) -> DocumentBlock {
     let row = |q: &QuantityEvidence| {
         let partners = q.partners.as_ref().map_or(Agreement::NotTested, |p| p.outcome);
         vec![
@@ -57,7 +57,7 @@ fn by_derivatives(c: &CrossCheck) -> Block {
             mark(gravest([q.status_outcome, q.degree_slope.outcome, partners])),
         ]
     };
-    Block::table(
+    DocumentBlock::table(
         "a. the degree: slope of log sigma against log dwell where psi goes on between positions as it was \
          at the start of each",
         [
@@ -76,7 +76,7 @@ fn by_derivatives(c: &CrossCheck) -> Block {
 }
 
 /// Items a and b with dwells, unknown by unknown.
-fn by_unknown(c: &CrossCheck) -> Block {
+fn by_unknown(c: &CrossCheck) -> DocumentBlock {
     let row = |q: &QuantityEvidence| {
         vec![
             q.name.clone(),
@@ -89,7 +89,7 @@ fn by_unknown(c: &CrossCheck) -> Block {
             mark(q.inflation.outcome),
         ]
     };
-    Block::table(
+    DocumentBlock::table(
         "a. the accuracy order: slope of log sigma (psi: of the start; held against that of the end as well) \
          against log dwell; b. factor on sigma (psi: of the end) for a prior variance times 100",
         [
@@ -107,7 +107,7 @@ fn by_unknown(c: &CrossCheck) -> Block {
 }
 
 /// Item b, direction by direction.
-fn by_direction(c: &CrossCheck) -> Block {
+fn by_direction(c: &CrossCheck) -> DocumentBlock {
     let row = |v: &NullEvidence| {
         let correlation = |k: Check| k.measured.map_or_else(String::new, |x| format!("{x:.6}"));
         vec![
@@ -118,7 +118,7 @@ fn by_direction(c: &CrossCheck) -> Block {
             v.correlation.map_or_else(String::new, |k| mark(k.outcome)),
         ]
     };
-    Block::table(
+    DocumentBlock::table(
         "b. directions that Z does not see (SI units)",
         [
             left("direction"),
@@ -132,7 +132,7 @@ fn by_direction(c: &CrossCheck) -> Block {
 }
 
 /// Checks of the whole scheme: the number of directions of item b, and items c to f.
-fn whole(c: &CrossCheck) -> Block {
+fn whole(c: &CrossCheck) -> DocumentBlock {
     let spaces = c.spaces.iter().map(|s| {
         let what = format!("a. {}", s.what);
         vec![what, s.predicted.clone(), s.measured.clone(), String::new(), mark(s.outcome)]
@@ -158,7 +158,7 @@ fn whole(c: &CrossCheck) -> Block {
     }));
     let columns =
         [left("evidence"), right("predicted"), right("measured"), left("band (95 %)"), left("finding")];
-    Block::table("The filter as a whole", columns, rows)
+    DocumentBlock::table("The filter as a whole", columns, rows)
 }
 
 /// Row of a check that passes or fails.
@@ -270,11 +270,11 @@ impl Answer for CrossCheck {
         }
         blocks.extend((!self.null_space.is_empty()).then(|| by_direction(self)));
         blocks.push(whole(self));
-        blocks.extend(Block::list_if_any("What disagrees", self.disagreements.clone()));
-        blocks.extend(Block::list_if_any("Not resolvable, and why", self.unresolved.clone()));
-        blocks.push(Block::list("How", self.method.clone()));
-        blocks.push(Block::list("Not tested by evidence", self.not_tested.clone()));
-        blocks.push(Block::list(
+        blocks.extend(DocumentBlock::list_if_any("What disagrees", self.disagreements.clone()));
+        blocks.extend(DocumentBlock::list_if_any("Not resolvable, and why", self.unresolved.clone()));
+        blocks.push(DocumentBlock::list("How", self.method.clone()));
+        blocks.push(DocumentBlock::list("Not tested by evidence", self.not_tested.clone()));
+        blocks.push(DocumentBlock::list(
             "Validity of the small-angle model",
             validity(&self.validity, &self.conditions),
         ));
@@ -288,7 +288,7 @@ impl Answer for CrossCheck {
         let wrong = self.filter.as_ref();
         assumed.extend(wrong.map(|filter| format!("the filter is wrong on purpose: {filter}")));
         assumed.push(format!("a prediction is wrong with probability below {}", at_most(self.error_bound)));
-        blocks.push(Block::list("Assumed", assumed));
+        blocks.push(DocumentBlock::list("Assumed", assumed));
         let verdict = match (self.passed, self.verdicts_agree) {
             (true, _) if self.counts.not_resolvable > 0 => {
                 "filter and exact verdicts agree as far as resolvable"

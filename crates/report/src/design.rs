@@ -8,9 +8,9 @@ use obsdeg_design::design::{
 
 use obsdeg_evidence::requirements::{Miss, Requirements};
 
-use crate::document::{Block, Document, left, number, right};
+use crate::document::{Document, DocumentBlock, left, number, right};
 use crate::excess::Excess;
-use crate::figure::{BLACK, BLUE, Figure, FigureError, Line, Stroke};
+use crate::figure::{BLACK, BLUE, Curve, Figure, FigureError, Stroke};
 use crate::figures::{File, picture};
 use crate::{Answer, gimbals, omitted, stated, words};
 
@@ -149,7 +149,7 @@ fn searched(d: &Design) -> &'static str {
     }
 }
 
-fn table(heading: &str, found: &[Found]) -> Block {
+fn table(heading: &str, found: &[Found]) -> DocumentBlock {
     let row = |(i, f): (usize, &Found)| {
         let image = f.image_of.map_or_else(String::new, |of| format!(" (image of {of})"));
         vec![
@@ -166,7 +166,7 @@ fn table(heading: &str, found: &[Found]) -> Block {
             format!("{} of {}", f.rank[0], f.rank[1]),
         ]
     };
-    Block::table(
+    DocumentBlock::table(
         heading,
         [
             right(""),
@@ -184,7 +184,7 @@ fn table(heading: &str, found: &[Found]) -> Block {
 }
 
 /// Gimbal angles that the operator sets at each position of a scheme.
-fn gimbal_angles(f: &Found) -> Block {
+fn gimbal_angles(f: &Found) -> DocumentBlock {
     let columns =
         [left(""), left("position")].into_iter().chain(gimbals::NAMES.map(right)).collect::<Vec<_>>();
     let row = |(i, (name, angles)): (usize, (&String, &String))| {
@@ -192,7 +192,7 @@ fn gimbal_angles(f: &Found) -> Block {
         [format!("p{}", i + 1), name.clone()].into_iter().chain(set).collect::<Vec<_>>()
     };
     let rows = f.positions.iter().zip(&f.angles).enumerate().map(row);
-    Block::table("Gimbal angles of the first [deg]", columns, rows)
+    DocumentBlock::table("Gimbal angles of the first [deg]", columns, rows)
 }
 
 /// How the schemes were found and ordered, one sentence each.
@@ -623,7 +623,7 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
 }
 
 /// Front of sigma against bias; `None` if the search counts no bench.
-fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
+fn bias_front(d: &Design, s: &SearchReport) -> Option<DocumentBlock> {
     let row = |p: &BiasPoint| vec![p.positions.join(" "), number(p.sigma), number(p.bias), number(p.total)];
     let unit = s.unit.as_ref().map_or_else(|| "over what is required".into(), |u| format!("in {u}"));
     let how = match d.bias_front_complete {
@@ -638,7 +638,7 @@ fn bias_front(d: &Design, s: &SearchReport) -> Option<Block> {
         s.criterion
     );
     let columns = [left("positions"), right("sigma"), right("bias"), right("total")];
-    (!d.bias_front.is_empty()).then(|| Block::table(heading, columns, d.bias_front.iter().map(row)))
+    (!d.bias_front.is_empty()).then(|| DocumentBlock::table(heading, columns, d.bias_front.iter().map(row)))
 }
 
 impl Answer for Design {
@@ -657,8 +657,8 @@ impl Answer for Design {
             blocks.extend(gimbals::block(self.gimbals.as_ref()));
             blocks.extend(self.omitted.iter().flat_map(|o| omitted::blocks(o, " by the first scheme")));
             blocks.extend(bias_front(self, s));
-            blocks.push(Block::list("How", how(self, s)));
-            blocks.push(Block::list("How good the best can be", bound(self, s)));
+            blocks.push(DocumentBlock::list("How", how(self, s)));
+            blocks.push(DocumentBlock::list("How good the best can be", bound(self, s)));
             blocks.push(
                 table(
                     "Front of total time against the criterion (other dwells by exchange, not proven)",
@@ -667,7 +667,7 @@ impl Answer for Design {
                 .without(left_out),
             );
         }
-        blocks.push(Block::list(
+        blocks.push(DocumentBlock::list(
             "Fewest positions that make every required coefficient observable",
             minimum(self),
         ));
@@ -687,7 +687,7 @@ impl Answer for Design {
         "ranks of sets modulo {} random 61-bit primes: an observable set is overlooked with probability below {}",
         self.primes, words::at_most(self.error_bound)
     ));
-        blocks.push(Block::list("Assumed", assumed));
+        blocks.push(DocumentBlock::list("Assumed", assumed));
         let what = self.search.as_ref().map_or_else(
             || "fewest positions".into(),
             |s| format!("{} of {} positions", s.positions, self.candidates.len()),
@@ -717,8 +717,8 @@ fn shortened(names: &[String]) -> String {
 }
 
 /// Lower bound of the criterion over total time.
-pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Line {
-    Line {
+pub(crate) fn bound_line(bound: &[[f64; 2]]) -> Curve {
+    Curve {
         label: "no scheme of the candidates in equal dwells is below".into(),
         color: BLACK,
         stroke: Stroke::Dashed,
@@ -761,7 +761,7 @@ pub(crate) fn figures(d: &Design) -> Result<Vec<File>, FigureError> {
         y_label: label,
         x_range: ends(|f| f.total_s),
         y_range: ends(|f| f.value).map(|(low, high)| (low.min(lowest), high)),
-        lines: std::iter::once(Line {
+        lines: std::iter::once(Curve {
             label: if bound.is_empty() { String::new() } else { "best found".into() },
             color: BLUE,
             stroke: Stroke::Solid,

@@ -9,9 +9,9 @@ use crate::figure::Figure;
 use crate::panels::Panels;
 
 /// A part of a document.
-pub(crate) enum Block {
+pub(crate) enum DocumentBlock {
     /// Table; without a heading if that is empty.
-    Table { heading: String, columns: Vec<Column>, rows: Vec<Vec<Cell>> },
+    Table { heading: String, columns: Vec<TableColumn>, rows: Vec<Vec<TableCell>> },
     /// Lines, wrapped; without a heading if that is empty.
     List { heading: String, lines: Vec<String> },
     /// The heading of a part (level 1) or of a section of it (level 2).
@@ -23,7 +23,7 @@ pub(crate) enum Block {
     /// A picture.
     Picture(Picture),
     /// Status of each scheme or model, in boxes at the beginning.
-    Status(Vec<Status>),
+    Status(Vec<StatusBox>),
     /// Part that may be folded away.
     Fold(Fold),
     /// Page break before the next block, in formats with pages.
@@ -37,23 +37,27 @@ pub(crate) struct Fold {
     pub(crate) title: String,
     /// False for details that a printed page leaves out; texts have them all.
     pub(crate) printed: bool,
-    pub(crate) blocks: Vec<Block>,
+    pub(crate) blocks: Vec<DocumentBlock>,
 }
 
-impl Block {
-    pub(crate) fn fold(level: usize, title: impl Into<String>, blocks: Vec<Block>) -> Self {
+impl DocumentBlock {
+    pub(crate) fn fold(level: usize, title: impl Into<String>, blocks: Vec<DocumentBlock>) -> Self {
         Self::Fold(Fold { level, title: title.into(), printed: true, blocks })
     }
 
     /// Details that a printed page leaves out; `None` without any.
-    pub(crate) fn details(level: usize, title: impl Into<String>, blocks: Vec<Block>) -> Option<Self> {
+    pub(crate) fn details(
+        level: usize,
+        title: impl Into<String>,
+        blocks: Vec<DocumentBlock>,
+    ) -> Option<Self> {
         let fold = Fold { level, title: title.into(), printed: false, blocks };
         (!fold.blocks.is_empty()).then_some(Self::Fold(fold))
     }
 
-    pub(crate) fn table<C: Into<Cell>>(
+    pub(crate) fn table<C: Into<TableCell>>(
         heading: impl Into<String>,
-        columns: impl Into<Vec<Column>>,
+        columns: impl Into<Vec<TableColumn>>,
         rows: impl IntoIterator<Item = Vec<C>>,
     ) -> Self {
         let rows = rows.into_iter().map(|row| row.into_iter().map(Into::into).collect());
@@ -64,8 +68,9 @@ impl Block {
     pub(crate) fn without(self, names: &[&str]) -> Self {
         let Self::Table { heading, columns, rows } = self else { return self };
         let kept: Vec<bool> = columns.iter().map(|c| !names.contains(&c.name.as_ref())).collect();
-        let keep =
-            |row: Vec<Cell>| row.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(cell, _)| cell).collect();
+        let keep = |row: Vec<TableCell>| {
+            row.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(cell, _)| cell).collect()
+        };
         let rows = rows.into_iter().map(keep).collect();
         let columns = columns.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(column, _)| column).collect();
         Self::Table { heading, columns, rows }
@@ -92,25 +97,25 @@ impl Block {
 
 /// A column of a table.
 #[derive(Clone)]
-pub(crate) struct Column {
+pub(crate) struct TableColumn {
     pub(crate) name: Cow<'static, str>,
     /// True for numbers, which are set flush right.
     pub(crate) number: bool,
 }
 
 /// A column of text.
-pub(crate) fn left(name: impl Into<Cow<'static, str>>) -> Column {
-    Column { name: name.into(), number: false }
+pub(crate) fn left(name: impl Into<Cow<'static, str>>) -> TableColumn {
+    TableColumn { name: name.into(), number: false }
 }
 
 /// A column of numbers.
-pub(crate) fn right(name: impl Into<Cow<'static, str>>) -> Column {
-    Column { name: name.into(), number: true }
+pub(crate) fn right(name: impl Into<Cow<'static, str>>) -> TableColumn {
+    TableColumn { name: name.into(), number: true }
 }
 
 /// A cell of a table.
 #[derive(Clone)]
-pub(crate) struct Cell {
+pub(crate) struct TableCell {
     pub(crate) text: String,
     /// LaTeX of a formula; `None` for texts.
     pub(crate) latex: Option<String>,
@@ -118,7 +123,7 @@ pub(crate) struct Cell {
     pub(crate) grade: Option<Grade>,
 }
 
-impl Cell {
+impl TableCell {
     pub(crate) fn formula(text: impl Into<String>, latex: String) -> Self {
         Self { text: text.into(), latex: Some(latex), grade: None }
     }
@@ -128,7 +133,7 @@ impl Cell {
     }
 }
 
-impl<T: Into<String>> From<T> for Cell {
+impl<T: Into<String>> From<T> for TableCell {
     fn from(text: T) -> Self {
         Self { text: text.into(), latex: None, grade: None }
     }
@@ -139,9 +144,9 @@ impl<T: Into<String>> From<T> for Cell {
 const CARDS: [&str; 2] = ["step", "question"];
 
 /// A table for the templates of pages.
-pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>]) -> Value {
-    let cell = |c: &Cell| json!({ "text": c.text, "grade": c.grade.map(Grade::name) });
-    let texts = |row: &Vec<Cell>| row.iter().map(cell).collect::<Vec<_>>();
+pub(crate) fn table_of_page(heading: &str, columns: &[TableColumn], rows: &[Vec<TableCell>]) -> Value {
+    let cell = |c: &TableCell| json!({ "text": c.text, "grade": c.grade.map(Grade::name) });
+    let texts = |row: &Vec<TableCell>| row.iter().map(cell).collect::<Vec<_>>();
     json!({
         "kind": "table",
         "heading": heading,
@@ -153,7 +158,7 @@ pub(crate) fn table_of_page(heading: &str, columns: &[Column], rows: &[Vec<Cell>
 }
 
 /// Status of one scheme, model or calibration.
-pub(crate) struct Status {
+pub(crate) struct StatusBox {
     /// Name of the scheme, model or calibration.
     pub(crate) title: String,
     /// Answers, one per question.
@@ -203,14 +208,14 @@ impl Grade {
     }
 }
 
-impl Status {
+impl StatusBox {
     /// Status as a table, for formats without boxes.
-    fn table(&self) -> Block {
+    fn table(&self) -> DocumentBlock {
         let row = |f: &StatusRow| [f.what, f.grade.mark(), &f.text].map(String::from).to_vec();
         let action = |text: &String| ["Recommended action", "", text].map(String::from).to_vec();
         let columns = [left("question"), left("status"), left("finding")];
         let rows = self.rows.iter().map(row).chain(self.actions.iter().map(action));
-        Block::table(format!("Status: {}", self.title), columns, rows)
+        DocumentBlock::table(format!("Status: {}", self.title), columns, rows)
     }
 }
 
@@ -260,7 +265,7 @@ impl Picture {
 pub struct Document {
     pub(crate) title: String,
     pub(crate) lead: Vec<String>,
-    pub(crate) blocks: Vec<Block>,
+    pub(crate) blocks: Vec<DocumentBlock>,
 }
 
 /// A number with four significant digits.
@@ -304,19 +309,21 @@ pub(crate) fn optional(x: Option<f64>) -> String {
 
 /// A block, or pictures that follow each other.
 pub(crate) enum BlockGroup<'a> {
-    Block(&'a Block),
+    Block(&'a DocumentBlock),
     Pictures(Vec<&'a Picture>),
 }
 
 /// Blocks, with successive pictures grouped unless they are wide.
-pub(crate) fn parts(blocks: &[Block]) -> Vec<BlockGroup<'_>> {
+pub(crate) fn parts(blocks: &[DocumentBlock]) -> Vec<BlockGroup<'_>> {
     let mut out: Vec<BlockGroup<'_>> = Vec::new();
     for block in blocks {
         match (block, out.last_mut()) {
-            (Block::Picture(p), Some(BlockGroup::Pictures(list))) if !p.is_wide() && !list[0].is_wide() => {
+            (DocumentBlock::Picture(p), Some(BlockGroup::Pictures(list)))
+                if !p.is_wide() && !list[0].is_wide() =>
+            {
                 list.push(p)
             }
-            (Block::Picture(p), _) => out.push(BlockGroup::Pictures(vec![p])),
+            (DocumentBlock::Picture(p), _) => out.push(BlockGroup::Pictures(vec![p])),
             (block, _) => out.push(BlockGroup::Block(block)),
         }
     }
@@ -324,11 +331,11 @@ pub(crate) fn parts(blocks: &[Block]) -> Vec<BlockGroup<'_>> {
 }
 
 /// Blocks with status boxes as tables, and folds as sections.
-fn unfolded(blocks: Vec<Block>) -> Vec<Block> {
-    let of = |b: Block| match b {
-        Block::Status(boxes) => boxes.iter().map(Status::table).collect(),
-        Block::Fold(fold) => {
-            let mut out = vec![Block::Section { level: fold.level.min(2), title: fold.title }];
+fn unfolded(blocks: Vec<DocumentBlock>) -> Vec<DocumentBlock> {
+    let of = |b: DocumentBlock| match b {
+        DocumentBlock::Status(boxes) => boxes.iter().map(StatusBox::table).collect(),
+        DocumentBlock::Fold(fold) => {
+            let mut out = vec![DocumentBlock::Section { level: fold.level.min(2), title: fold.title }];
             out.extend(unfolded(fold.blocks));
             out
         }
@@ -347,7 +354,7 @@ impl Document {
     /// The document with all pictures in `folder`.
     pub(crate) fn with_pictures_in(mut self, folder: &str) -> Self {
         for block in &mut self.blocks {
-            if let Block::Picture(p) = block {
+            if let DocumentBlock::Picture(p) = block {
                 p.name = format!("{folder}/{}", p.name);
             }
         }
@@ -356,7 +363,7 @@ impl Document {
 
     pub(crate) fn pictures(&self) -> impl Iterator<Item = &Picture> {
         self.blocks.iter().filter_map(|b| match b {
-            Block::Picture(p) => Some(p),
+            DocumentBlock::Picture(p) => Some(p),
             _ => None,
         })
     }
@@ -371,10 +378,14 @@ mod tests {
     #[test]
     fn a_formula_in_every_format() {
         let columns = [left("what"), right("how many")];
-        let row = vec![Cell::formula("D_FX", "D_{FX}".into()), "a_1".into()];
+        let row = vec![TableCell::formula("D_FX", "D_{FX}".into()), "a_1".into()];
         let formula = Typeset { text: "x_1 = 2".into(), latex: "x_{1} = 2".into() };
-        let blocks = [Some(Block::table("", columns, [row])), Block::formulas("Where", [formula])];
-        assert!(Block::formulas("Nowhere", []).is_none() && Block::list_if_any("Nothing", vec![]).is_none());
+        let blocks =
+            [Some(DocumentBlock::table("", columns, [row])), DocumentBlock::formulas("Where", [formula])];
+        assert!(
+            DocumentBlock::formulas("Nowhere", []).is_none()
+                && DocumentBlock::list_if_any("Nothing", vec![]).is_none()
+        );
         let d = Document {
             title: "T".into(),
             lead: vec!["so".into()],
@@ -391,7 +402,7 @@ mod tests {
              \\endhead\n$D_{FX}$ & a\\_1 \\\\\n\\bottomrule\n\\end{longtable}\n\\paragraph{Where}\n\
              \\begin{itemize}\n\\item $x_{1} = 2$\n\\end{itemize}\n"
         );
-        let table = crate::table::document(&d, crate::Layout::default());
+        let table = crate::table::document(&d, crate::TerminalLayout::default());
         let lines: Vec<&str> = table.lines().collect();
         assert_eq!(lines[..3], ["T", "  so", " what   how many"]);
         assert_eq!(lines[4..], [" D_FX        a_1", "", "Where", "  x_1 = 2"]);
@@ -402,7 +413,7 @@ mod tests {
         let sentence = "so ".repeat(30);
         for sentences in 1..=3 {
             let row: Vec<&str> = (0..3).map(|k| if k < sentences { &sentence } else { "short" }).collect();
-            let blocks = vec![Block::table("", [left("a"), left("b"), left("c")], [row])];
+            let blocks = vec![DocumentBlock::table("", [left("a"), left("b"), left("c")], [row])];
             let latex = crate::latex::document(&Document { title: "T".into(), lead: vec![], blocks });
             let spec =
                 latex.split("longtable}{").nth(1).and_then(|t| t.split("}\n").next()).unwrap_or_default();

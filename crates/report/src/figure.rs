@@ -47,7 +47,7 @@ pub(crate) fn style(i: usize) -> (&'static str, Stroke) {
 
 /// A curve.
 #[derive(Debug, Clone)]
-pub(crate) struct Line {
+pub(crate) struct Curve {
     /// Label in the legend; empty for none.
     pub(crate) label: String,
     pub(crate) color: &'static str,
@@ -76,7 +76,7 @@ pub(crate) struct Figure {
     pub(crate) x_label: String,
     pub(crate) y_label: String,
     pub(crate) bands: Vec<Band>,
-    pub(crate) lines: Vec<Line>,
+    pub(crate) lines: Vec<Curve>,
     pub(crate) points: Vec<NamedPoint>,
     /// Positions of vertical lines, which separate positions.
     pub(crate) marks: Vec<f64>,
@@ -271,7 +271,7 @@ impl Figure {
 
     /// Legend below a small figure, in two columns if its labels are short, and its height in pixels.
     fn legend(&self) -> (String, f64) {
-        let named: Vec<&Line> = self.lines.iter().filter(|l| !l.label.is_empty()).collect();
+        let named: Vec<&Curve> = self.lines.iter().filter(|l| !l.label.is_empty()).collect();
         let columns = if named.iter().all(|l| l.label.chars().count() <= SHORT_LABEL) { 2 } else { 1 };
         let mut out = String::new();
         for (i, l) in named.iter().enumerate() {
@@ -485,7 +485,7 @@ mod tests {
 
     #[test]
     fn it_is_the_same_whenever_it_is_drawn() {
-        let line = |end| Line {
+        let line = |end| Curve {
             label: "sigma".into(),
             color: BLUE,
             stroke: Stroke::Solid,

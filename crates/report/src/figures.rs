@@ -5,7 +5,7 @@ use obsdeg_exact::parallel;
 
 use crate::document::number;
 use crate::figure::{
-    AMBER, BLACK, BLUE, Band, Figure, FigureError, Line, ORANGE, SKY, Stroke, grid, heat, png, style,
+    AMBER, BLACK, BLUE, Band, Curve, Figure, FigureError, ORANGE, SKY, Stroke, grid, heat, png, style,
 };
 use obsdeg_evidence::crosscheck::{CrossCheck, HistoryPoint, SlopeCurve};
 
@@ -92,8 +92,8 @@ pub(crate) fn line(
     color: &'static str,
     stroke: Stroke,
     points: Vec<(f64, f64)>,
-) -> Line {
-    Line { label: label.into(), color, stroke, points }
+) -> Curve {
+    Curve { label: label.into(), color, stroke, points }
 }
 
 /// The curve of one series: truth, estimate and the band of three sigma around it.

@@ -2,7 +2,7 @@
 
 use obsdeg_core::model::{GimbalReport, GimbalStop, GimbalTurn};
 
-use crate::document::{Block, short as deg};
+use crate::document::{DocumentBlock, short as deg};
 use crate::words;
 
 /// Names of the Euler angles, with the axis of each gimbal.
@@ -80,8 +80,8 @@ fn turn(t: &GimbalTurn) -> Option<String> {
 }
 
 /// Gimbal limits and turns of a scheme; `None` without limits.
-pub(crate) fn block(report: Option<&GimbalReport>) -> Option<Block> {
-    Block::list_if_any("Gimbals", lines(report))
+pub(crate) fn block(report: Option<&GimbalReport>) -> Option<DocumentBlock> {
+    DocumentBlock::list_if_any("Gimbals", lines(report))
 }
 
 /// Lines on limits and turns; empty without limits.

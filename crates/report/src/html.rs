@@ -9,9 +9,10 @@ use pulldown_latex::{Parser, Storage, push_mathml};
 use serde_json::{Value as Json, json};
 
 use crate::document::{
-    Block, BlockGroup, Document, Drawing, Fold, Picture, Status, StatusRow, Typeset, parts, table_of_page,
+    BlockGroup, Document, DocumentBlock, Drawing, Fold, Picture, StatusBox, StatusRow, Typeset, parts,
+    table_of_page,
 };
-use crate::figure::{CLIP, Figure, Line, Stroke};
+use crate::figure::{CLIP, Curve, Figure, Stroke};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/page.html");
@@ -25,7 +26,8 @@ const FONT: &[u8] = include_bytes!("../assets/math.woff2");
 /// The document as a page.
 pub(crate) fn page(d: &Document, version: &str) -> Result<String, ReportError> {
     // blocks before the first part
-    let first = d.blocks.iter().position(|b| matches!(b, Block::Section { .. } | Block::Fold(_)));
+    let first =
+        d.blocks.iter().position(|b| matches!(b, DocumentBlock::Section { .. } | DocumentBlock::Fold(_)));
     let (front, rest) = d.blocks.split_at(first.unwrap_or(d.blocks.len()));
     let mut ids = 0;
     let [front, blocks] = [front, rest].map(|b| listed(b, &mut ids));
@@ -70,21 +72,21 @@ pub(crate) fn fragment(d: &Document) -> Result<String, ReportError> {
     })?)
 }
 
-fn has_curves(blocks: &[Block]) -> bool {
+fn has_curves(blocks: &[DocumentBlock]) -> bool {
     blocks.iter().any(|b| match b {
-        Block::Picture(p) => matches!(p.drawing, Drawing::Curves(_)),
-        Block::Fold(fold) => has_curves(&fold.blocks),
+        DocumentBlock::Picture(p) => matches!(p.drawing, Drawing::Curves(_)),
+        DocumentBlock::Fold(fold) => has_curves(&fold.blocks),
         _ => false,
     })
 }
 
 /// Blocks as data for the template. A fold becomes its beginning, its blocks and its end. `ids` counts the
 /// targets of links.
-fn listed(blocks: &[Block], ids: &mut usize) -> Vec<Json> {
+fn listed(blocks: &[DocumentBlock], ids: &mut usize) -> Vec<Json> {
     let mut out = Vec::new();
     for part in parts(blocks) {
         *ids += 1;
-        if let BlockGroup::Block(Block::Fold(fold)) = &part {
+        if let BlockGroup::Block(DocumentBlock::Fold(fold)) = &part {
             let id = format!("section-{ids}");
             let Fold { level, title, printed, blocks } = fold;
             out.push(json!({ "kind": "fold", "level": level, "title": title, "printed": printed, "id": id }));
@@ -107,25 +109,27 @@ fn block(i: usize, part: &BlockGroup<'_>) -> Json {
         BlockGroup::Block(b) => b,
     };
     match b {
-        Block::Section { level, title } => {
+        DocumentBlock::Section { level, title } => {
             json!({ "kind": "section", "level": level, "title": title, "id": format!("section-{i}") })
         }
-        Block::Text(text) => json!({ "kind": "text", "text": text }),
-        Block::List { heading, lines } => json!({ "kind": "list", "heading": heading, "lines": lines }),
-        Block::Table { heading, columns, rows } => table_of_page(heading, columns, rows),
-        Block::Formulas { heading, lines } => {
+        DocumentBlock::Text(text) => json!({ "kind": "text", "text": text }),
+        DocumentBlock::List { heading, lines } => {
+            json!({ "kind": "list", "heading": heading, "lines": lines })
+        }
+        DocumentBlock::Table { heading, columns, rows } => table_of_page(heading, columns, rows),
+        DocumentBlock::Formulas { heading, lines } => {
             let lines: Vec<Json> = lines.iter().map(formula).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
         // pictures come in groups, folds are taken apart by `listed`
-        Block::Picture(_) | Block::Fold(_) => Json::Null,
-        Block::NewPage => json!({ "kind": "page" }),
-        Block::Status(boxes) => {
+        DocumentBlock::Picture(_) | DocumentBlock::Fold(_) => Json::Null,
+        DocumentBlock::NewPage => json!({ "kind": "page" }),
+        DocumentBlock::Status(boxes) => {
             let row = |f: &StatusRow| {
                 let (grade, mark) = (f.grade.name(), f.grade.mark());
                 json!({ "what": f.what, "grade": grade, "mark": mark, "text": f.text })
             };
-            let of = |s: &Status| {
+            let of = |s: &StatusBox| {
                 let rows: Vec<Json> = s.rows.iter().map(row).collect();
                 json!({ "title": s.title, "rows": rows, "actions": s.actions })
             };
@@ -281,7 +285,7 @@ fn curves(f: &Figure) -> Json {
         bands.push(json!({ "series": [high, low], "color": color }));
     }
     // a line without a label is a piece of the one before, if it is drawn alike
-    let alike = |a: &Line, b: &Line| b.label.is_empty() && a.color == b.color && dash(a) == dash(b);
+    let alike = |a: &Curve, b: &Curve| b.label.is_empty() && a.color == b.color && dash(a) == dash(b);
     for pieces in f.lines.chunk_by(alike) {
         let points = drawn(&mut pieces.iter().map(|l| l.points.clone()));
         let first = &pieces[0];
@@ -296,7 +300,7 @@ fn curves(f: &Figure) -> Json {
 }
 
 /// Dashes of a line in pixels; empty for a solid one.
-fn dash(l: &Line) -> &'static [u32] {
+fn dash(l: &Curve) -> &'static [u32] {
     match l.stroke {
         Stroke::Solid => &[],
         Stroke::Dashed => &[8, 4],
@@ -311,7 +315,7 @@ mod tests {
 
     #[test]
     fn pieces_of_a_curve_are_one_series() {
-        let line = |label: &str, points: &[(f64, f64)]| Line {
+        let line = |label: &str, points: &[(f64, f64)]| Curve {
             label: label.into(),
             color: "#000000",
             stroke: Stroke::Solid,

@@ -2,7 +2,7 @@
 
 mod math;
 
-use crate::document::{Block, Cell, Column, Document};
+use crate::document::{Document, DocumentBlock, TableCell, TableColumn};
 use crate::visible;
 #[cfg(feature = "pdf")]
 pub(crate) use math::{FUNCTIONS, GREEK};
@@ -48,7 +48,7 @@ fn items(lines: impl Iterator<Item = String>) -> String {
     if items.is_empty() { items } else { format!("\\begin{{itemize}}\n{items}\\end{{itemize}}\n") }
 }
 
-fn cell(cell: &Cell) -> String {
+fn cell(cell: &TableCell) -> String {
     cell.latex.as_ref().map_or_else(|| escape(&cell.text), |formula| format!("${formula}$"))
 }
 
@@ -60,7 +60,7 @@ const SHORT: usize = 12;
 
 /// Largest width of every column in characters: columns of texts are limited until all fit the line. `None`
 /// is unlimited.
-fn widths(columns: &[Column], rows: &[Vec<Cell>]) -> Vec<Option<usize>> {
+fn widths(columns: &[TableColumn], rows: &[Vec<TableCell>]) -> Vec<Option<usize>> {
     let natural = |k: usize| {
         let cells = rows.iter().map(|r| r[k].text.chars().count());
         cells.chain([columns[k].name.chars().count()]).max().unwrap_or(0)
@@ -72,12 +72,12 @@ fn widths(columns: &[Column], rows: &[Vec<Cell>]) -> Vec<Option<usize>> {
     };
     // largest width of texts that fits
     let most = (SHORT..=LINE).rev().find(|&most| taken(most) <= room).unwrap_or(SHORT);
-    let wrapped = |(w, c): (usize, &Column)| (!c.number && w > most).then_some(most);
+    let wrapped = |(w, c): (usize, &TableColumn)| (!c.number && w > most).then_some(most);
     natural.into_iter().zip(columns).map(wrapped).collect()
 }
 
 /// Longtable; columns of texts are wrapped if the line is too short.
-fn table(columns: &[Column], rows: &[Vec<Cell>]) -> String {
+fn table(columns: &[TableColumn], rows: &[Vec<TableCell>]) -> String {
     let widths = widths(columns, rows);
     let spec = columns.iter().zip(widths).map(|(column, width)| match (column.number, width) {
         (true, _) => "r".into(),
@@ -103,30 +103,30 @@ fn body(d: &Document) -> String {
     let mut out = items(d.lead.iter().map(|l| escape(l)));
     for block in &d.blocks {
         match block {
-            Block::Table { heading: title, columns, rows } => {
+            DocumentBlock::Table { heading: title, columns, rows } => {
                 out.push_str(&heading(title));
                 out.push_str(&table(columns, rows));
             }
-            Block::List { heading: title, lines } => {
+            DocumentBlock::List { heading: title, lines } => {
                 out.push_str(&heading(title));
                 out.push_str(&items(lines.iter().map(|l| escape(l))));
             }
-            Block::Section { level, title } => {
+            DocumentBlock::Section { level, title } => {
                 let command = if *level == 1 { "section" } else { "subsection" };
                 out.push_str(&format!("\\{command}*{{{}}}\n", escape(title)));
             }
-            Block::Text(text) => out.push_str(&format!("{}\n\n", escape(text))),
-            Block::Formulas { heading: title, lines } => {
+            DocumentBlock::Text(text) => out.push_str(&format!("{}\n\n", escape(text))),
+            DocumentBlock::Formulas { heading: title, lines } => {
                 out.push_str(&heading(title));
                 out.push_str(&items(lines.iter().map(|l| format!("${}$", l.latex))));
             }
-            Block::Picture(p) => out.push_str(&format!(
+            DocumentBlock::Picture(p) => out.push_str(&format!(
                 "\\begin{{center}}\\includegraphics[width=.8\\linewidth,height=.35\\textheight,\
                  keepaspectratio]{{{}.pdf}}\\\\{}\\end{{center}}\n",
                 p.name,
                 escape(&p.caption)
             )),
-            Block::Status(_) | Block::Fold(_) | Block::NewPage => {}
+            DocumentBlock::Status(_) | DocumentBlock::Fold(_) | DocumentBlock::NewPage => {}
         }
     }
     out

@@ -3,11 +3,11 @@
 //! ```
 //! use obsdeg_core::analysis::{AnalysisOptions, analyze};
 //! use obsdeg_core::model::{Angle, Scheme};
-//! use obsdeg_report::{Format, Layout, written};
+//! use obsdeg_report::{Format, TerminalLayout, written};
 //!
 //! let positions = [[0, 0, 0], [180, 0, 0]].map(|p| p.map(Angle::from_degrees));
 //! let answer = analyze(&Scheme::of_angles(positions), AnalysisOptions::default(), None)?;
-//! let text = written(&answer, Format::Markdown, Layout::default())?;
+//! let text = written(&answer, Format::Markdown, TerminalLayout::default())?;
 //! assert!(text.starts_with("# Observable degrees"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -140,7 +140,7 @@ impl fmt::Display for Format {
 
 /// Layout of a table on a terminal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Layout {
+pub struct TerminalLayout {
     /// Width in characters; `None` for no limit.
     pub width: Option<u16>,
     /// True if headings and verdicts are styled with ANSI codes.
@@ -253,8 +253,8 @@ impl<A: Answer> Answer for Several<A> {
         for (file, answer) in &self.0 {
             let document = answer.document();
             let title = format!("{file}: {}", document.title);
-            blocks.push(document::Block::Section { level: 1, title });
-            blocks.extend(document.lead.into_iter().map(document::Block::Text));
+            blocks.push(document::DocumentBlock::Section { level: 1, title });
+            blocks.extend(document.lead.into_iter().map(document::DocumentBlock::Text));
             blocks.extend(document.blocks);
         }
         Document { title: String::new(), lead: vec![], blocks }
@@ -276,7 +276,7 @@ impl<A: Answer> Answer for Several<A> {
 ///
 /// # Errors
 /// [`ReportError`] when a serializer fails.
-pub fn written(answer: &impl Answer, format: Format, layout: Layout) -> Result<String, ReportError> {
+pub fn written(answer: &impl Answer, format: Format, layout: TerminalLayout) -> Result<String, ReportError> {
     Ok(match format {
         Format::Table => table::document(&answer.document(), layout),
         Format::Json => json(answer)?,

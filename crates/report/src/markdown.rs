@@ -1,6 +1,6 @@
 //! GitHub-flavoured Markdown.
 
-use crate::document::{Block, Cell, Document};
+use crate::document::{Document, DocumentBlock, TableCell};
 use crate::visible;
 
 /// Text of a table cell or paragraph, with Markdown's markup characters escaped.
@@ -32,7 +32,7 @@ fn code(text: &str) -> String {
     if most == 0 { format!("`{text}`") } else { format!("{fence} {text} {fence}") }
 }
 
-fn cell(cell: &Cell) -> String {
+fn cell(cell: &TableCell) -> String {
     if cell.latex.is_some() { code(&cell.text) } else { escape(&cell.text) }
 }
 
@@ -48,32 +48,34 @@ pub(crate) fn document(d: &Document) -> String {
         text => format!("{} {}\n\n", "#".repeat(above + 1), escape(text)),
     };
     for (i, block) in d.blocks.iter().enumerate() {
-        if matches!(block, Block::Status(_) | Block::Fold(_) | Block::NewPage) {
+        if matches!(block, DocumentBlock::Status(_) | DocumentBlock::Fold(_) | DocumentBlock::NewPage) {
             continue;
         }
         out.push_str(if i == 0 { "" } else { "\n" });
         match block {
-            Block::Table { heading: title, columns, rows } => {
+            DocumentBlock::Table { heading: title, columns, rows } => {
                 out.push_str(&heading(above, title));
                 out.push_str(&row(columns.iter().map(|c| escape(&c.name))));
                 out.push_str(&format!("|{}\n", " --- |".repeat(columns.len())));
                 out.extend(rows.iter().map(|cells| row(cells.iter().map(cell))));
             }
-            Block::List { heading: title, lines } => {
+            DocumentBlock::List { heading: title, lines } => {
                 out.push_str(&heading(above, title));
                 out.extend(lines.iter().map(|line| format!("- {}\n", escape(line))));
             }
-            Block::Section { level, title } => {
+            DocumentBlock::Section { level, title } => {
                 above = level + 1;
                 out.push_str(&format!("{} {}\n", "#".repeat(above), escape(title)));
             }
-            Block::Text(text) => out.push_str(&format!("{}\n", escape(text))),
-            Block::Formulas { heading: title, lines } => {
+            DocumentBlock::Text(text) => out.push_str(&format!("{}\n", escape(text))),
+            DocumentBlock::Formulas { heading: title, lines } => {
                 out.push_str(&heading(above, title));
                 out.extend(lines.iter().map(|line| format!("- ${}$\n", line.latex)));
             }
-            Block::Picture(p) => out.push_str(&format!("![{}]({}.svg)\n", escape(&p.caption), p.name)),
-            Block::Status(_) | Block::Fold(_) | Block::NewPage => {}
+            DocumentBlock::Picture(p) => {
+                out.push_str(&format!("![{}]({}.svg)\n", escape(&p.caption), p.name))
+            }
+            DocumentBlock::Status(_) | DocumentBlock::Fold(_) | DocumentBlock::NewPage => {}
         }
     }
     out

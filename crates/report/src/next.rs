@@ -3,7 +3,7 @@
 use obsdeg_design::next::{AddedPosition, Extension, NextPositions, Requalification, Standing};
 
 use crate::Answer;
-use crate::document::{Block, Document, left, number, right};
+use crate::document::{Document, DocumentBlock, left, number, right};
 use crate::stated;
 use crate::words::{self, names};
 
@@ -111,7 +111,7 @@ fn standing(s: &Standing) -> Vec<String> {
 }
 
 /// Requalification after each number of days.
-fn schedule(n: &NextPositions) -> Option<Block> {
+fn schedule(n: &NextPositions) -> Option<DocumentBlock> {
     let columns = [
         right("days"),
         left("smallest margin before"),
@@ -136,7 +136,8 @@ fn schedule(n: &NextPositions) -> Option<Block> {
         ]
     };
     let rows: Vec<Vec<String>> = n.schedule.iter().map(row).collect();
-    (!rows.is_empty()).then(|| Block::table("Requalification by days since the calibration", columns, rows))
+    (!rows.is_empty())
+        .then(|| DocumentBlock::table("Requalification by days since the calibration", columns, rows))
 }
 
 fn validity(n: &NextPositions) -> Vec<String> {
@@ -225,10 +226,11 @@ impl Answer for NextPositions {
         let row = |(name, s): (String, &Standing)| [vec![name], standing(s)].concat();
         let before = self.before.as_ref().map(|s| row(("nothing".into(), s)));
         let rows = self.found.iter().map(|e| row((positions(e), &e.then)));
-        let extensions = Block::table("Extensions, best first", columns, before.into_iter().chain(rows));
-        let mut blocks: Vec<Block> = schedule(self).into_iter().chain([extensions]).collect();
-        blocks.push(Block::list("Validity", validity(self)));
-        blocks.push(Block::list("Conditions", stated::measurement(&self.conditions)));
+        let extensions =
+            DocumentBlock::table("Extensions, best first", columns, before.into_iter().chain(rows));
+        let mut blocks: Vec<DocumentBlock> = schedule(self).into_iter().chain([extensions]).collect();
+        blocks.push(DocumentBlock::list("Validity", validity(self)));
+        blocks.push(DocumentBlock::list("Conditions", stated::measurement(&self.conditions)));
         let after = match (self.after_calibration, self.positions.len()) {
             (true, _) => "a calibration".into(),
             (false, k @ 0..=6) => format!("{k} positions ({})", self.positions.join(", ")),

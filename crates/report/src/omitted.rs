@@ -11,7 +11,7 @@ use obsdeg_evidence::simulation::omitted::{
 };
 use obsdeg_evidence::simulation::si_per_shown;
 
-use crate::document::{Block, left, number, right};
+use crate::document::{DocumentBlock, left, number, right};
 use crate::words;
 
 /// Largest number of changes that are listed of a silent error.
@@ -109,7 +109,7 @@ fn judged(of: &OmittedEffects) -> bool {
 }
 
 /// The blocks of a document: the families, and the budgets where a bench is stated.
-pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
+pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<DocumentBlock> {
     let columns = [
         left("family (terms)"),
         left("class"),
@@ -121,10 +121,10 @@ pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
     ];
     let left_out: &[&str] = if judged(of) { &[] } else { &["uses up a margin at"] };
     let heading = format!("Not estimated{whose}: effect on the estimates");
-    let mut out = vec![Block::table(heading, columns, of.families.iter().map(row)).without(left_out)];
-    out.push(Block::list(format!("Not estimated{whose}: conditions"), conditions(of)));
+    let mut out = vec![DocumentBlock::table(heading, columns, of.families.iter().map(row)).without(left_out)];
+    out.push(DocumentBlock::list(format!("Not estimated{whose}: conditions"), conditions(of)));
     out.extend(trade(of, whose));
-    out.extend(Block::list_if_any(
+    out.extend(DocumentBlock::list_if_any(
         format!("Not estimated{whose}: what would help, each as it was tried"),
         advice(of),
     ));
@@ -134,7 +134,7 @@ pub(crate) fn blocks(of: &OmittedEffects, whose: &str) -> Vec<Block> {
 
 /// The blocks of a report: the families, and the budgets of all unknowns but psi in full, the least margin
 /// first.
-pub(crate) fn in_full(of: &OmittedEffects) -> (Vec<Block>, Vec<Block>) {
+pub(crate) fn in_full(of: &OmittedEffects) -> (Vec<DocumentBlock>, Vec<DocumentBlock>) {
     let alone = OmittedEffects { budgets: Vec::new(), ..of.clone() };
     let budgets = of.budgets.iter().filter(|b| !b.unknown.starts_with("psi"));
     (blocks(&alone, ""), budgets.map(|b| budget(b, "", usize::MAX)).collect())
@@ -228,7 +228,7 @@ fn by_size(review: &ComparedScheme, family: &str, size: f64) -> Option<String> {
 }
 
 /// Sigma, bias and total of the worst drift coefficient under every carry; `None` without a bench.
-fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
+fn trade(of: &OmittedEffects, whose: &str) -> Option<DocumentBlock> {
     let columns = [left("carry"), left("worst"), right("sigma"), right("bias"), right("total"), left("unit")];
     let row = |c: &CarryUncertainty| {
         let at_once = if c.without_slews { " (repositioning at once)" } else { "" };
@@ -251,7 +251,7 @@ fn trade(of: &OmittedEffects, whose: &str) -> Option<Block> {
     let heading = format!(
         "Carries{whose}: sigma, bias by the bench, and total of the coefficient with the largest total"
     );
-    (!of.carries.is_empty()).then(|| Block::table(heading, columns, of.carries.iter().map(row)))
+    (!of.carries.is_empty()).then(|| DocumentBlock::table(heading, columns, of.carries.iter().map(row)))
 }
 
 /// Remedies, a line each: the largest total over its requirement with it, and its cost in sigma.
@@ -277,7 +277,7 @@ pub(crate) fn advised(a: &Advice) -> String {
 
 /// Uncertainty budget of one unknown in the form of the GUM, with its total; lines beyond `most`, and those
 /// of less than [`LEAST`] percent, together in one line.
-fn budget(b: &Budget, whose: &str, most: usize) -> Block {
+fn budget(b: &Budget, whose: &str, most: usize) -> DocumentBlock {
     let columns = [
         left("source"),
         left("type"),
@@ -317,7 +317,7 @@ fn budget(b: &Budget, whose: &str, most: usize) -> Block {
     let required = b.requirement.map_or_else(String::new, |r| format!(", required {}", number(r)));
     let heading =
         format!("Uncertainty budget of {}{whose}: total {} {}{required}", b.unknown, number(b.total), b.unit);
-    Block::table(heading, columns, rows)
+    DocumentBlock::table(heading, columns, rows)
 }
 
 /// Printed budgets: the largest totals over requirement first, then those with the smallest share of the

@@ -17,7 +17,7 @@ use typst::{Library, LibraryExt, World};
 use typst_layout::PagedDocument;
 use typst_pdf::PdfOptions;
 
-use crate::document::{Block, BlockGroup, Document, parts, table_of_page};
+use crate::document::{BlockGroup, Document, DocumentBlock, parts, table_of_page};
 use crate::{ReportError, visible};
 
 const TEMPLATE: &str = include_str!("../assets/pages.typ");
@@ -125,15 +125,22 @@ fn part(part: BlockGroup<'_>) -> Json {
         BlockGroup::Block(block) => block,
     };
     match block {
-        Block::Section { level, title } => json!({ "kind": "section", "level": level, "title": title }),
-        Block::Text(text) => json!({ "kind": "text", "text": text }),
-        Block::List { heading, lines } => json!({ "kind": "list", "heading": heading, "lines": lines }),
-        Block::Table { heading, columns, rows } => table_of_page(heading, columns, rows),
-        Block::Formulas { heading, lines } => {
+        DocumentBlock::Section { level, title } => {
+            json!({ "kind": "section", "level": level, "title": title })
+        }
+        DocumentBlock::Text(text) => json!({ "kind": "text", "text": text }),
+        DocumentBlock::List { heading, lines } => {
+            json!({ "kind": "list", "heading": heading, "lines": lines })
+        }
+        DocumentBlock::Table { heading, columns, rows } => table_of_page(heading, columns, rows),
+        DocumentBlock::Formulas { heading, lines } => {
             let lines: Vec<String> = lines.iter().map(|l| math::typst(&l.latex)).collect();
             json!({ "kind": "formulas", "heading": heading, "lines": lines })
         }
         // pictures come in groups, a status is a table here, and folds are taken apart
-        Block::Picture(_) | Block::Status(_) | Block::Fold(_) | Block::NewPage => Json::Null,
+        DocumentBlock::Picture(_)
+        | DocumentBlock::Status(_)
+        | DocumentBlock::Fold(_)
+        | DocumentBlock::NewPage => Json::Null,
     }
 }

@@ -4,7 +4,7 @@ use obsdeg_core::model::{Carry, GIMBAL_NAMES, Scheme, parse_attitude};
 use obsdeg_core::title_block::TitleBlock;
 use obsdeg_design::procedure::{Obstacle, ObstacleKind, Procedure, Step, StepKind, StepTurn};
 
-use crate::document::{Block, Column, Document, Drawing, Picture, left, optional, right, short};
+use crate::document::{Document, DocumentBlock, Drawing, Picture, TableColumn, left, optional, right, short};
 use crate::figures::File;
 use crate::words::{self, names};
 use crate::{Answer, ReportError, acceptance, csv_text, html, poses, stated};
@@ -105,7 +105,7 @@ fn angles(p: &Procedure, of: &[f64; 3]) -> String {
     [0, 1, 2].map(shown).join(", ")
 }
 
-fn steps(p: &Procedure) -> Block {
+fn steps(p: &Procedure) -> DocumentBlock {
     let columns = [
         right("step"),
         left("do"),
@@ -138,7 +138,7 @@ fn steps(p: &Procedure) -> Block {
             "[ ]".into(),
         ]
     };
-    Block::table("", columns, p.steps.iter().map(row))
+    DocumentBlock::table("", columns, p.steps.iter().map(row))
 }
 
 fn obstacle(o: &Obstacle) -> String {
@@ -169,7 +169,7 @@ fn obstacle(o: &Obstacle) -> String {
     }
 }
 
-fn after(p: &Procedure) -> Block {
+fn after(p: &Procedure) -> DocumentBlock {
     let columns = [
         left("after"),
         left("at"),
@@ -191,10 +191,10 @@ fn after(p: &Procedure) -> Block {
         };
         vec![a.position.clone(), clock(a.end_s), met, determines, meets]
     });
-    Block::table("", columns, rows)
+    DocumentBlock::table("", columns, rows)
 }
 
-fn coefficients(p: &Procedure) -> Block {
+fn coefficients(p: &Procedure) -> DocumentBlock {
     let columns = [
         left("coefficient"),
         left("unit"),
@@ -214,7 +214,7 @@ fn coefficients(p: &Procedure) -> Block {
             name(&c.met_from),
         ]
     });
-    Block::table("Coefficients", columns, rows)
+    DocumentBlock::table("Coefficients", columns, rows)
 }
 
 /// Positions that are needed for requirements, in a sentence; `None` if none is met at the end.
@@ -283,19 +283,19 @@ fn tolerance(p: &Procedure) -> Vec<String> {
 }
 
 /// Entries of the title block, and lines for signatures.
-fn title_block(block: &TitleBlock) -> Option<Block> {
+fn title_block(block: &TitleBlock) -> Option<DocumentBlock> {
     let entries = block.entries();
-    let stated: Vec<Column> = entries
+    let stated: Vec<TableColumn> = entries
         .iter()
         .map(|(name, _)| left(*name))
         .chain(block.signatures.iter().map(|role| left(format!("{role}: name, date, signature"))))
         .collect();
     let texts = entries.iter().map(|(_, text)| text.to_string());
     let row: Vec<String> = texts.chain(block.signatures.iter().map(|_| "\u{a0}".repeat(44))).collect();
-    (!stated.is_empty()).then(|| Block::table("", stated, [row]))
+    (!stated.is_empty()).then(|| DocumentBlock::table("", stated, [row]))
 }
 
-fn rotations(p: &Procedure) -> Option<Block> {
+fn rotations(p: &Procedure) -> Option<DocumentBlock> {
     let columns = [
         right("k"),
         left("Ux, Uy, Uz"),
@@ -309,7 +309,7 @@ fn rotations(p: &Procedure) -> Option<Block> {
         [vec![r.number.to_string(), r.axis.map(short).join(", ")], numbers.to_vec()].concat()
     });
     let heading = "Rotation table (axes right, front, up of PSINS are Z_p, X_p, Y_p)";
-    (!p.rotations.is_empty()).then(|| Block::table(heading, columns, rows))
+    (!p.rotations.is_empty()).then(|| DocumentBlock::table(heading, columns, rows))
 }
 
 /// Rules for the platform between the steps.
@@ -393,24 +393,24 @@ impl Answer for Procedure {
 
     fn document(&self) -> Document {
         let named = if self.name.is_empty() { String::new() } else { format!(": {}", self.name) };
-        let mut blocks: Vec<Block> = title_block(&self.document).into_iter().collect();
-        let section = |title: &str| Block::Section { level: 1, title: title.into() };
-        blocks.extend([section("Rules"), Block::list("", rules(self)), section(STEPS), steps(self)]);
+        let mut blocks: Vec<DocumentBlock> = title_block(&self.document).into_iter().collect();
+        let section = |title: &str| DocumentBlock::Section { level: 1, title: title.into() };
+        blocks.extend([section("Rules"), DocumentBlock::list("", rules(self)), section(STEPS), steps(self)]);
         blocks.extend([section(KNOWN), after(self), coefficients(self)]);
         if let Some(a) = &self.acceptance {
             blocks.extend([
                 section("Acceptance"),
                 acceptance::table("", a),
-                Block::list("Decision rule", acceptance::rule(a)),
+                DocumentBlock::list("Decision rule", acceptance::rule(a)),
             ]);
         }
         if let Some(table) = rotations(self) {
-            blocks.push(Block::fold(1, "Rotation table", vec![table]));
+            blocks.push(DocumentBlock::fold(1, "Rotation table", vec![table]));
         }
         let mut conditions = vec![stated::carry(self.carry).into(), stated::predicted(&self.conditions)];
         conditions.extend(stated::measurement(&self.conditions));
         conditions.extend(stated::by_default(&self.conditions));
-        blocks.push(Block::fold(1, "Conditions", vec![Block::list("", conditions)]));
+        blocks.push(DocumentBlock::fold(1, "Conditions", vec![DocumentBlock::list("", conditions)]));
         Document {
             title: format!("Procedure{named}"),
             lead: sentences(self).into_iter().map(|s| format!("{s}.")).collect(),
@@ -479,9 +479,9 @@ pub fn procedure_page(p: &Procedure, scheme: &Scheme) -> Result<File, ReportErro
         caption: poses::caption(&poses, latitude, p.conditions.latitude_by_default),
         drawing: Drawing::Panels(poses::panels(&poses, latitude)),
     };
-    let known = |b: &Block| matches!(b, Block::Section { title, .. } if title == KNOWN);
+    let known = |b: &DocumentBlock| matches!(b, DocumentBlock::Section { title, .. } if title == KNOWN);
     let at = document.blocks.iter().position(known).unwrap_or(document.blocks.len());
-    document.blocks.insert(at, Block::Picture(picture));
+    document.blocks.insert(at, DocumentBlock::Picture(picture));
     Ok(File::new("procedure.html", html::page(&document, &p.version)?))
 }
 

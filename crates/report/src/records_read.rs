@@ -4,7 +4,7 @@ use obsdeg_calibration::platform::{RecordRead, RecordsRead};
 
 use crate::Answer;
 use crate::calibration::{by_what, gaps, tenths};
-use crate::document::{Block, Document, left, number, right};
+use crate::document::{Document, DocumentBlock, left, number, right};
 
 /// Largest number of listed cells.
 const LISTED: usize = 20;
@@ -53,7 +53,7 @@ impl Answer for RecordsRead {
     fn document(&self) -> Document {
         let mut blocks = Vec::new();
         for r in &self.records {
-            blocks.push(Block::list(r.record.clone(), read(r)));
+            blocks.push(DocumentBlock::list(r.record.clone(), read(r)));
             let columns = [
                 left("position"),
                 right("first row [s]"),
@@ -70,7 +70,7 @@ impl Answer for RecordsRead {
                     p.force_g.map_or_else(|| "-".into(), |f| format!("{f:.6}")),
                 ]
             });
-            blocks.push(Block::table("Positions (times of the record)", columns, rows));
+            blocks.push(DocumentBlock::table("Positions (times of the record)", columns, rows));
             if !r.left_out.is_empty() {
                 let columns = [left("lines"), left("column"), right("value"), left("why")];
                 let rows = r.left_out.iter().take(LISTED).map(|c| {
@@ -82,7 +82,7 @@ impl Answer for RecordsRead {
                     n if n > LISTED => format!("Cells left out: {n}, of which the first {LISTED}"),
                     n => format!("Cells left out: {n}"),
                 };
-                blocks.push(Block::table(heading, columns, rows));
+                blocks.push(DocumentBlock::table(heading, columns, rows));
             }
         }
         let title = "Records as they are read".into();

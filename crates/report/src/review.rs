@@ -13,14 +13,14 @@ mod verdict;
 
 use obsdeg_calibration::Calibration;
 use obsdeg_core::analysis::Analysis;
-use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::degree::Status;
 use obsdeg_design::design::Minimum;
 use obsdeg_design::review::{DesignReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
 use crate::analysis::null_vector;
-use crate::document::{Block, Cell, Document, Fold, Typeset, left, number, optional, right};
+use crate::document::{Document, DocumentBlock, Fold, TableCell, Typeset, left, number, optional, right};
 use crate::excess::Excess;
 use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, resolve, simulation, stated, words};
 
@@ -57,11 +57,11 @@ pub(crate) fn document(
     .collect();
     let answers = answers::tables(&answers);
     let (compared, own) = if r.schemes.len() > 1 { (answers, Vec::new()) } else { (Vec::new(), answers) };
-    let mut blocks = vec![title::block(r, origin), Block::Text(title::made_from(r, origin))];
+    let mut blocks = vec![title::block(r, origin), DocumentBlock::Text(title::made_from(r, origin))];
     if r.schemes.len() > 1 {
         first::comparison(&mut blocks, r, compared);
     }
-    blocks.push(Block::Text(GRADES.into()));
+    blocks.push(DocumentBlock::Text(GRADES.into()));
     blocks.push(statuses(r, calibrations));
     blocks.extend(own);
     if alone {
@@ -73,13 +73,13 @@ pub(crate) fn document(
         blocks.push(comparison(r));
     }
     for (i, (name, c)) in calibrations.iter().enumerate() {
-        let mut own = vec![Block::Text(CALIBRATED.into())];
+        let mut own = vec![DocumentBlock::Text(CALIBRATED.into())];
         own.extend(calibrated::section(c, &format!("c{}", i + 1)));
-        blocks.push(Block::fold(1, format!("Calibration {name}"), own));
+        blocks.push(DocumentBlock::fold(1, format!("Calibration {name}"), own));
     }
     parts(&mut blocks, r, alone);
     blocks.extend(certificates(origin));
-    blocks.push(Block::fold(1, "Notation", vec![notation::notation(r)]));
+    blocks.push(DocumentBlock::fold(1, "Notation", vec![notation::notation(r)]));
     blocks.push(about(r, origin));
     let names: Vec<&str> = (r.schemes.iter().map(|s| s.name.as_str()))
         .chain(r.generic.iter().map(|g| g.name.as_str()))
@@ -94,32 +94,32 @@ fn reviewed(r: &DesignReview) -> impl Iterator<Item = (&SchemeReview, &ComparedS
 }
 
 /// Status of every scheme, model and calibration.
-fn statuses(r: &DesignReview, calibrations: &[(String, Calibration)]) -> Block {
+fn statuses(r: &DesignReview, calibrations: &[(String, Calibration)]) -> DocumentBlock {
     let run = calibrations.iter().map(|(name, c)| calibrated::status(c, format!("Calibration {name}")));
     let all = (reviewed(r).map(|(s, review)| verdict::status(s, review)))
         .chain(r.generic.iter().map(generic::status))
         .chain(r.models.iter().map(model::status))
         .chain(run);
-    Block::Status(all.collect())
+    DocumentBlock::Status(all.collect())
 }
 
 /// Comparison of the schemes.
-fn comparison(r: &DesignReview) -> Block {
+fn comparison(r: &DesignReview) -> DocumentBlock {
     let comparison = r.comparison.document();
-    let mut own: Vec<Block> = vec![compare::ratios(&r.comparison.schemes)];
+    let mut own: Vec<DocumentBlock> = vec![compare::ratios(&r.comparison.schemes)];
     own.extend(pictures::time_against_sigma(&r.schemes, "comparison_front"));
     own.extend(comparison.blocks.into_iter().filter_map(|b| match b {
-        Block::Fold(details) => Some(Block::Fold(Fold { level: 2, ..details })),
+        DocumentBlock::Fold(details) => Some(DocumentBlock::Fold(Fold { level: 2, ..details })),
         _ => None,
     }));
-    Block::fold(1, "Comparison of the schemes", own)
+    DocumentBlock::fold(1, "Comparison of the schemes", own)
 }
 
 /// Parts of the schemes and models; a single one has no fold of its own.
-fn parts(blocks: &mut Vec<Block>, r: &DesignReview, alone: bool) {
-    let mut part = |title: String, own: Vec<Block>| match alone {
+fn parts(blocks: &mut Vec<DocumentBlock>, r: &DesignReview, alone: bool) {
+    let mut part = |title: String, own: Vec<DocumentBlock>| match alone {
         true => blocks.extend(own),
-        false => blocks.extend([Block::NewPage, Block::fold(1, title, own)]),
+        false => blocks.extend([DocumentBlock::NewPage, DocumentBlock::fold(1, title, own)]),
     };
     for (i, (s, review)) in reviewed(r).enumerate() {
         let (mut own, id) = (Vec::new(), format!("s{}", i + 1));
@@ -148,8 +148,8 @@ fn parts(blocks: &mut Vec<Block>, r: &DesignReview, alone: bool) {
 }
 
 /// Program, command and files of the review.
-fn about(r: &DesignReview, origin: &Origin) -> Block {
-    let mut blocks = vec![Block::list(
+fn about(r: &DesignReview, origin: &Origin) -> DocumentBlock {
+    let mut blocks = vec![DocumentBlock::list(
         "",
         vec![
             format!("obsdeg {}; seed {}; {} Monte Carlo runs", r.version, r.seed, r.runs),
@@ -160,11 +160,11 @@ fn about(r: &DesignReview, origin: &Origin) -> Block {
         ],
     )];
     blocks.extend(title::origin_of(origin));
-    Block::fold(1, "About this report", blocks)
+    DocumentBlock::fold(1, "About this report", blocks)
 }
 
 /// Part on checking the exact verdicts of schemes without this program.
-fn certificates(origin: &Origin) -> Option<Block> {
+fn certificates(origin: &Origin) -> Option<DocumentBlock> {
     let steps = [
         "The exact verdicts of a scheme (status and degree of every unknown, ranks, null space) have a \
          certificate: a JSON file that proves them.",
@@ -177,17 +177,17 @@ fn certificates(origin: &Origin) -> Option<Block> {
          checker of your own.",
         "Predicted sigmas, the run and the evidence by a filter are not part of a certificate.",
     ];
-    let steps = Block::list("", steps.map(String::from).to_vec());
-    let own = vec![steps, Block::list("Certificates", origin.certificates.clone())];
-    (!origin.certificates.is_empty()).then(|| Block::fold(1, "How to check this without obsdeg", own))
+    let steps = DocumentBlock::list("", steps.map(String::from).to_vec());
+    let own = vec![steps, DocumentBlock::list("Certificates", origin.certificates.clone())];
+    (!origin.certificates.is_empty()).then(|| DocumentBlock::fold(1, "How to check this without obsdeg", own))
 }
 
-fn section(level: usize, title: impl Into<String>) -> Block {
-    Block::Section { level, title: title.into() }
+fn section(level: usize, title: impl Into<String>) -> DocumentBlock {
+    DocumentBlock::Section { level, title: title.into() }
 }
 
-fn is_list(block: &Block, name: &str) -> bool {
-    matches!(block, Block::List { heading, .. } if heading == name)
+fn is_list(block: &DocumentBlock, name: &str) -> bool {
+    matches!(block, DocumentBlock::List { heading, .. } if heading == name)
 }
 
 fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
@@ -195,7 +195,7 @@ fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
 }
 
 /// Two pages and the appendix of a scheme. Of several schemes a printed page has the two pages alone.
-fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, alone: bool, id: &str) {
+fn scheme(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, review: &ComparedScheme, alone: bool, id: &str) {
     let level = if alone { 1 } else { 2 };
     let coefficients: Vec<&Quantity> =
         review.quantities.iter().filter(|q| !q.name.starts_with("psi")).collect();
@@ -206,8 +206,8 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, al
     blocks.push(section(level, "What limits it, and what to change"));
     fewest(blocks, s, review);
     let typical = omitted::typical(review);
-    blocks.extend(Block::list_if_any("What errors outside the model would do", typical));
-    blocks.extend(met_while(review).map(Block::Text));
+    blocks.extend(DocumentBlock::list_if_any("What errors outside the model would do", typical));
+    blocks.extend(met_while(review).map(DocumentBlock::Text));
     blocks.extend(correlated(s));
     let caption =
         "Uncertainty budgets: shares of samples and of the errors of the bench in the squared total";
@@ -224,11 +224,11 @@ fn scheme(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, al
     let large = s.positions.len() > MANY_POSITIONS || s.analysis.quantities.len() > MANY_UNKNOWNS;
     let parts = parts.map(|(title, blocks)| {
         let printed = !large || !SECONDARY.contains(&title);
-        Block::Fold(Fold { level: if alone { 2 } else { 3 }, title: title.into(), printed, blocks })
+        DocumentBlock::Fold(Fold { level: if alone { 2 } else { 3 }, title: title.into(), printed, blocks })
     });
     match alone {
         true => blocks.extend(parts),
-        false => blocks.extend(Block::details(2, format!("Appendix of {}", s.name), parts.collect())),
+        false => blocks.extend(DocumentBlock::details(2, format!("Appendix of {}", s.name), parts.collect())),
     }
 }
 
@@ -238,10 +238,15 @@ const MANY_UNKNOWNS: usize = 20;
 const SECONDARY: [&str; 2] = ["Positions in numbers", "Sensitivity"];
 
 /// Verdict in sentences, with its conditions in one list.
-fn verdict(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, coefficients: &[&Quantity]) {
+fn verdict(
+    blocks: &mut Vec<DocumentBlock>,
+    s: &SchemeReview,
+    review: &ComparedScheme,
+    coefficients: &[&Quantity],
+) {
     let a = &s.analysis;
-    blocks.push(Block::Text(verdict::sentences(s, review, coefficients)));
-    blocks.extend((!s.description.is_empty()).then(|| Block::Text(s.description.clone())));
+    blocks.push(DocumentBlock::Text(verdict::sentences(s, review, coefficients)));
+    blocks.extend((!s.description.is_empty()).then(|| DocumentBlock::Text(s.description.clone())));
     if s.simulation.timeline.iter().any(|t| t.slew) {
         let exact = if a.positions.iter().any(|p| !p.turns.is_empty()) {
             "are exact and of turns fast against the earth rate, in which torquer errors act"
@@ -253,9 +258,9 @@ fn verdict(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme, c
              told apart, formulas and the fewest positions {exact}; predicted sigmas, requirements and the \
              run are with the slews, by which psi moves and which may determine more, or less."
         );
-        blocks.push(Block::Text(text));
+        blocks.push(DocumentBlock::Text(text));
     }
-    blocks.extend(simulation::warning(&s.simulation.conditions).map(Block::Text));
+    blocks.extend(simulation::warning(&s.simulation.conditions).map(DocumentBlock::Text));
 }
 
 /// Sentence on the sizes of errors outside the model that use up a margin, also of single terms.
@@ -286,7 +291,7 @@ fn appendix(
     review: &ComparedScheme,
     coefficients: &[&Quantity],
     id: &str,
-) -> Vec<(&'static str, Vec<Block>)> {
+) -> Vec<(&'static str, Vec<DocumentBlock>)> {
     let a = &s.analysis;
     let mut told_apart = Vec::new();
     null_space(&mut told_apart, a);
@@ -301,7 +306,7 @@ fn appendix(
     let notes = alike(&a.notes).into_iter().chain(evidence).chain(alternatives);
     assumed.extend(notes.map(|n| format!("note: {n}")));
     let mut valid =
-        vec![Block::list("", simulation::validity(&s.simulation.validity, &s.simulation.conditions))];
+        vec![DocumentBlock::list("", simulation::validity(&s.simulation.validity, &s.simulation.conditions))];
     valid.extend(compare::at_own_drifts(std::slice::from_ref(review)));
     vec![
         ("Unknowns", vec![unknowns(a, review), pictures::staircase(a, &format!("{id}_staircase"))]),
@@ -313,7 +318,7 @@ fn appendix(
         ("Evidence by a filter", evidence_of(s, id)),
         ("One run of the filter", run(s, review, id)),
         ("Validity of the small-angle model", valid),
-        ("Assumptions and certainty", vec![Block::list("", assumed)]),
+        ("Assumptions and certainty", vec![DocumentBlock::list("", assumed)]),
     ]
 }
 
@@ -333,16 +338,16 @@ const PRINTED: usize = 14;
 
 /// Effects of errors that the scheme does not estimate; with a bench also the budgets. Long tables are
 /// details.
-fn not_estimated(review: &ComparedScheme) -> Vec<Block> {
+fn not_estimated(review: &ComparedScheme) -> Vec<DocumentBlock> {
     let (effects, budgets) = omitted::in_full(&review.omitted);
-    let long = |b: &Block| matches!(b, Block::Table { rows, .. } if rows.len() > PRINTED);
-    let (long, mut out): (Vec<Block>, Vec<Block>) = effects.into_iter().partition(long);
-    out.extend(Block::details(3, "Every error that is not estimated", long));
-    out.extend(Block::details(3, "Uncertainty budgets, line by line", budgets));
+    let long = |b: &DocumentBlock| matches!(b, DocumentBlock::Table { rows, .. } if rows.len() > PRINTED);
+    let (long, mut out): (Vec<DocumentBlock>, Vec<DocumentBlock>) = effects.into_iter().partition(long);
+    out.extend(DocumentBlock::details(3, "Every error that is not estimated", long));
+    out.extend(DocumentBlock::details(3, "Uncertainty budgets, line by line", budgets));
     out
 }
 
-fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
+fn unknowns(a: &Analysis, review: &ComparedScheme) -> DocumentBlock {
     let row = |q: &obsdeg_core::analysis::Quantity| {
         let predicted = review.quantities.iter().find(|p| p.name == q.name);
         let of = |value: fn(&Quantity) -> Option<f64>| optional(predicted.and_then(value));
@@ -364,7 +369,7 @@ fn unknowns(a: &Analysis, review: &ComparedScheme) -> Block {
             if excited.is_empty() { "-".into() } else { excited.join(" ") },
         ]
     };
-    Block::table(
+    DocumentBlock::table(
         format!(
             "Every unknown, best first (- where it is not determined; {})",
             stated::predicted(&review.conditions)
@@ -397,7 +402,7 @@ fn left_out(review: &ComparedScheme) -> Vec<&'static str> {
     required.iter().copied().chain(bench).collect()
 }
 
-fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
+fn null_space(blocks: &mut Vec<DocumentBlock>, a: &Analysis) {
     let mut lines = Vec::new();
     for v in &a.null_space {
         let names = joined(v.iter().map(|c| c.name.as_str()));
@@ -429,8 +434,8 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             seen.join(", ")
         ));
     }
-    blocks.push(Block::list("", lines));
-    blocks.extend(Block::formulas(words::UNSEEN, a.null_space.iter().map(|v| null_vector(v))));
+    blocks.push(DocumentBlock::list("", lines));
+    blocks.extend(DocumentBlock::formulas(words::UNSEEN, a.null_space.iter().map(|v| null_vector(v))));
     let combination = |c: &obsdeg_core::analysis::CombinationReport| {
         let asked = if c.requested { ", asked for" } else { "" };
         let dwell = match words::with_dwell(a, c.degree, c.accuracy_order) {
@@ -446,7 +451,8 @@ fn null_space(blocks: &mut Vec<Block>, a: &Analysis) {
             latex: format!("{}\\quad\\text{{{verdict}}}", latex::expression(&c.expression)),
         }
     };
-    blocks.extend(Block::formulas("Observable combinations", words::combinations(a).map(combination)));
+    blocks
+        .extend(DocumentBlock::formulas("Observable combinations", words::combinations(a).map(combination)));
 }
 
 /// A time in s, to a tenth.
@@ -468,7 +474,7 @@ fn duration(t_s: f64) -> String {
     format!("{} s{long}", seconds(t_s))
 }
 
-fn positions(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
+fn positions(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, id: &str) {
     let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
         vec![
             p.name.clone(),
@@ -489,7 +495,7 @@ fn positions(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
         right("slew to it [s]"),
         left("turn"),
     ];
-    let table = Block::table("Positions in order of time", columns, rows);
+    let table = DocumentBlock::table("Positions in order of time", columns, rows);
     let empty = |all: &dyn Fn(usize) -> bool| (0..s.positions.len()).all(all);
     let unused = [
         ("X_p Y_p Z_p", empty(&|i| s.analysis.positions[i].attitude.is_none())),
@@ -504,13 +510,18 @@ fn positions(blocks: &mut Vec<Block>, s: &SchemeReview, id: &str) {
 }
 
 /// Gravity along the axes of the gyros at each position, and what each position excites.
-fn numbers(s: &SchemeReview, coefficients: &[&Quantity], review: &ComparedScheme, id: &str) -> Vec<Block> {
+fn numbers(
+    s: &SchemeReview,
+    coefficients: &[&Quantity],
+    review: &ComparedScheme,
+    id: &str,
+) -> Vec<DocumentBlock> {
     let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.3}") };
     let g = |g: [f64; 3]| g.map(component).join(", ");
     let row =
         |p: &obsdeg_design::review::PositionReview| vec![p.name.clone(), g(p.g[0]), g(p.g[1]), g(p.g[2])];
     let mut out = vec![
-        Block::table(
+        DocumentBlock::table(
             "Components of g along the axes I, O, S of each gyro (in g, at the start)",
             [left("position"), right("gyro X: I O S"), right("gyro Y: I O S"), right("gyro Z: I O S")],
             s.positions.iter().map(row),
@@ -526,7 +537,7 @@ fn numbers(s: &SchemeReview, coefficients: &[&Quantity], review: &ComparedScheme
 /// Length in bytes from which a formula is one of many terms or decimals.
 const LONG_FORMULA: usize = 220;
 
-fn solved(a: &Analysis) -> Vec<Block> {
+fn solved(a: &Analysis) -> Vec<DocumentBlock> {
     let formula = |left: String, expression: &str, solution: &obsdeg_core::analysis::Solution| Typeset {
         text: format!("{expression} = {}", solution.text),
         latex: format!("{left} = {}", latex::solution(solution, a.frame, &a.stations)),
@@ -543,18 +554,19 @@ fn solved(a: &Analysis) -> Vec<Block> {
     let ((long, short), (long_sums, short_sums)): ((Vec<_>, Vec<_>), (Vec<_>, Vec<_>)) =
         (unknowns.partition(is_long), combinations.partition(is_long));
     let none = long.is_empty() && short.is_empty();
-    let mut out: Vec<Block> =
-        Vec::from_iter(none.then(|| Block::Text("No unknown is observable by itself.".into())));
-    out.extend(Block::formulas("Unknowns", short));
-    out.extend(Block::formulas("Combinations", short_sums));
-    out.extend(Block::list_if_any(words::ACCURACY, words::accuracy(a)));
-    let long =
-        Block::formulas("Unknowns", long).into_iter().chain(Block::formulas("Combinations", long_sums));
-    out.extend(Block::details(3, "Formulas of many terms or decimals", long.collect()));
+    let mut out: Vec<DocumentBlock> =
+        Vec::from_iter(none.then(|| DocumentBlock::Text("No unknown is observable by itself.".into())));
+    out.extend(DocumentBlock::formulas("Unknowns", short));
+    out.extend(DocumentBlock::formulas("Combinations", short_sums));
+    out.extend(DocumentBlock::list_if_any(words::ACCURACY, words::accuracy(a)));
+    let long = DocumentBlock::formulas("Unknowns", long)
+        .into_iter()
+        .chain(DocumentBlock::formulas("Combinations", long_sums));
+    out.extend(DocumentBlock::details(3, "Formulas of many terms or decimals", long.collect()));
     out
 }
 
-fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block> {
+fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<DocumentBlock> {
     let row = |c: &obsdeg_evidence::compare::Sensitivity| {
         vec![
             c.condition.clone(),
@@ -563,7 +575,7 @@ fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block
             compare::worst(c.worst_determined.as_ref()),
         ]
     };
-    let mut out = vec![Block::table(
+    let mut out = vec![DocumentBlock::table(
         format!(
             "Rank, and largest {} in deg/h (per g): of all coefficients, of those determined here (- where one \
              is not observable)",
@@ -572,7 +584,7 @@ fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block
         [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")],
         review.sensitivity.iter().map(row),
     )];
-    out.extend(Block::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
+    out.extend(DocumentBlock::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
     out.extend(pictures::latitudes(s, &format!("{id}_latitude")));
     out
 }
@@ -582,7 +594,7 @@ const CORRELATED: f64 = 0.9;
 const LINES: usize = 6;
 
 /// Strongest correlations, under a diffuse prior, of the estimates of unknowns that are determined.
-fn correlated(s: &SchemeReview) -> Option<Block> {
+fn correlated(s: &SchemeReview) -> Option<DocumentBlock> {
     let of = &s.evidence.as_ref().ok()?.correlation;
     let determined = |name: &str| {
         let found = s.analysis.quantities.iter().find(|q| q.name == name);
@@ -603,7 +615,7 @@ fn correlated(s: &SchemeReview) -> Option<Block> {
     let title = format!(
         "Estimates that depend on each other (correlation of {CORRELATED} or more, with a diffuse prior)"
     );
-    Block::list_if_any(title, lines)
+    DocumentBlock::list_if_any(title, lines)
 }
 
 /// Sentence on the smallest number of cardinal attitudes that make every coefficient observable.
@@ -626,13 +638,13 @@ fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
 }
 
 /// Fewest positions, the best scheme of the cardinal attitudes, and what each position is needed for.
-fn fewest(blocks: &mut Vec<Block>, s: &SchemeReview, review: &ComparedScheme) {
+fn fewest(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, review: &ComparedScheme) {
     let mut lines = Vec::new();
     lines.extend(s.alternatives.kept.as_ref().map(|kept| fewest_of_these(kept, s, review)));
     lines.extend(fewest_of_all(s, review));
     lines.extend(best_of_all(s));
     lines.extend(resolve::position_to_drop(review));
-    blocks.push(Block::list("", lines));
+    blocks.push(DocumentBlock::list("", lines));
     if !review.drop_one.is_empty() {
         blocks.push(without_one_position(review));
     }
@@ -682,7 +694,7 @@ fn best_of_all(s: &SchemeReview) -> Option<String> {
 }
 
 /// Table of the scheme without one of its positions.
-fn without_one_position(review: &ComparedScheme) -> Block {
+fn without_one_position(review: &ComparedScheme) -> DocumentBlock {
     let row = |d: &obsdeg_evidence::compare::DropOne| {
         let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
         vec![
@@ -697,7 +709,7 @@ fn without_one_position(review: &ComparedScheme) -> Block {
         false => "worst sigma(D) [deg/h, /g]",
     };
     let columns = ["without", "not observable any more", figure, compare::REQUIREMENTS[0]].map(left);
-    let table = Block::table("Without one position", columns, review.drop_one.iter().map(row));
+    let table = DocumentBlock::table("Without one position", columns, review.drop_one.iter().map(row));
     table.without(&left_out(review))
 }
 
@@ -705,10 +717,10 @@ fn without_one_position(review: &ComparedScheme) -> Block {
 const SLOPES: usize = 4;
 
 /// Evidence: a line per kind of check that agrees, and the rows of those that do not.
-fn evidence_of(s: &SchemeReview, id: &str) -> Vec<Block> {
+fn evidence_of(s: &SchemeReview, id: &str) -> Vec<DocumentBlock> {
     let c = match &s.evidence {
         Ok(c) => c,
-        Err(e) => return vec![Block::Text(format!("None: {}.", words::no_evidence(e)))],
+        Err(e) => return vec![DocumentBlock::Text(format!("None: {}.", words::no_evidence(e)))],
     };
     let outcome = match (c.passed, c.verdicts_agree) {
         (true, _) if c.counts.not_resolvable > 0 => "agree in every check that is resolvable",
@@ -718,34 +730,35 @@ fn evidence_of(s: &SchemeReview, id: &str) -> Vec<Block> {
     };
     // the run has the truth of the checks
     let run = if s.simulation.consistency.consistent { "" } else { ", but the run below is not consistent" };
-    let mut out = vec![Block::Text(format!(
+    let mut out = vec![DocumentBlock::Text(format!(
         "Exact verdicts and a Kalman filter are two independent paths: they {outcome}{run}."
     ))];
     let Document { lead, blocks, .. } = c.document();
-    out.extend(lead.into_iter().map(Block::Text));
+    out.extend(lead.into_iter().map(DocumentBlock::Text));
     let (mut agree, mut open, mut details) = (Vec::new(), Vec::new(), Vec::new());
     for block in blocks {
         match block {
-            Block::Table { heading, columns, rows } => {
-                let fails =
-                    |row: &&Vec<Cell>| row.iter().any(|c| c.text == "FAIL" || c.text == "not resolvable");
-                let failing: Vec<Vec<Cell>> = rows.iter().filter(fails).cloned().collect();
+            DocumentBlock::Table { heading, columns, rows } => {
+                let fails = |row: &&Vec<TableCell>| {
+                    row.iter().any(|c| c.text == "FAIL" || c.text == "not resolvable")
+                };
+                let failing: Vec<Vec<TableCell>> = rows.iter().filter(fails).cloned().collect();
                 agree.push(format!("{heading}: {} of {} agree", rows.len() - failing.len(), rows.len()));
                 if !failing.is_empty() {
-                    open.push(Block::Table {
+                    open.push(DocumentBlock::Table {
                         heading: format!("Not agreeing: {heading}"),
                         columns: columns.clone(),
                         rows: failing,
                     });
                 }
-                details.push(Block::Table { heading, columns, rows });
+                details.push(DocumentBlock::Table { heading, columns, rows });
             }
             b if is_list(&b, "Assumed") || is_list(&b, "Validity of the small-angle model") => {}
             b if is_list(&b, "What disagrees") || is_list(&b, "Not resolvable, and why") => open.push(b),
             b => details.push(b),
         }
     }
-    out.push(Block::list("Checks", agree));
+    out.push(DocumentBlock::list("Checks", agree));
     out.extend(open);
     let mut slopes = pictures::slopes(c, id);
     let more = slopes.split_off(slopes.len().min(SLOPES));
@@ -753,7 +766,7 @@ fn evidence_of(s: &SchemeReview, id: &str) -> Vec<Block> {
     out.extend(pictures::consistency(c, id));
     details.extend(more);
     details.push(pictures::correlation(c, &format!("{id}_correlation")));
-    out.extend(Block::details(3, "Every check", details));
+    out.extend(DocumentBlock::details(3, "Every check", details));
     out
 }
 
@@ -761,20 +774,20 @@ fn evidence_of(s: &SchemeReview, id: &str) -> Vec<Block> {
 const ERRORS: usize = 6;
 
 /// One run against a simulated truth: its lists, the errors of the worst unknowns, and in the details all.
-fn run(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block> {
+fn run(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<DocumentBlock> {
     let blocks = s.simulation.document().blocks.into_iter();
-    let kept = |b: &Block| {
-        matches!(b, Block::Table { .. } | Block::List { .. })
+    let kept = |b: &DocumentBlock| {
+        matches!(b, DocumentBlock::Table { .. } | DocumentBlock::List { .. })
             && !["Assumed", "Validity of the small-angle model"].iter().any(|name| is_list(b, name))
-            && !matches!(b, Block::List { heading, .. } if heading.starts_with("Not estimated"))
+            && !matches!(b, DocumentBlock::List { heading, .. } if heading.starts_with("Not estimated"))
     };
     // the unknowns' table has the predicted sigmas, and a page has no room for more columns
     let blocks = blocks.filter(kept).map(|b| b.without(&["predicted"]));
-    let (mut details, mut out): (Vec<Block>, Vec<Block>) =
-        blocks.partition(|b| matches!(b, Block::Table { .. }));
-    out.insert(0, Block::Text("One run against a simulated truth, with its errors:".into()));
+    let (mut details, mut out): (Vec<DocumentBlock>, Vec<DocumentBlock>) =
+        blocks.partition(|b| matches!(b, DocumentBlock::Table { .. }));
+    out.insert(0, DocumentBlock::Text("One run against a simulated truth, with its errors:".into()));
     let flat: Vec<&str> = (s.simulation.quantities.iter())
-        .filter(|q| q.status == Exact::NotExcited && q.outcome == Outcome::PriorOnly)
+        .filter(|q| q.status == Status::NotExcited && q.outcome == Outcome::PriorOnly)
         .map(|q| q.name.as_str())
         .collect();
     let margin = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.margin);
@@ -782,11 +795,11 @@ fn run(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<Block> {
     errors.sort_by(|(a, _), (b, _)| {
         margin(a).unwrap_or(f64::INFINITY).total_cmp(&margin(b).unwrap_or(f64::INFINITY))
     });
-    let mut pictures: Vec<Block> = errors.into_iter().map(|(_, picture)| picture).collect();
+    let mut pictures: Vec<DocumentBlock> = errors.into_iter().map(|(_, picture)| picture).collect();
     let rest = pictures.split_off(pictures.len().min(ERRORS));
     out.extend(pictures);
     out.extend(pictures::not_drawn(&flat));
     details.extend(rest);
-    out.extend(Block::details(3, "Estimates at the end, and the errors of all others", details));
+    out.extend(DocumentBlock::details(3, "Estimates at the end, and the errors of all others", details));
     out
 }

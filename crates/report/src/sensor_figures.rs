@@ -4,7 +4,7 @@ use obsdeg_design::sensors::{SensorCandidate, SensorUnknown, Sensors};
 
 use crate::ReportError;
 use crate::cells::{CellColumn, Cells};
-use crate::figure::{BLUE, Figure, Line, NamedPoint, Stroke};
+use crate::figure::{BLUE, Curve, Figure, NamedPoint, Stroke};
 use crate::figures::{File, picture};
 use crate::sensors::{about, has_costs, set};
 
@@ -60,7 +60,7 @@ fn front(s: &Sensors) -> Figure {
             if s.own_outputs.is_empty() { "" } else { "further " },
             if s.candidates.iter().any(|c| c.experiment) { " and the experiment" } else { "" }
         ),
-        lines: vec![Line { label: String::new(), color: BLUE, stroke: Stroke::Solid, points: steps }],
+        lines: vec![Curve { label: String::new(), color: BLUE, stroke: Stroke::Solid, points: steps }],
         points: s.front.iter().zip(&at).map(|(f, &at)| NamedPoint { name: name(&f.outputs), at }).collect(),
         x_range: Some((0.0, last)),
         y_range: Some((0.0, if costs { 1.15 * top } else { top + 1.0 })),

@@ -3,7 +3,7 @@
 use obsdeg_calibration::noise::{ColumnNoise, NoiseCoefficient, SensorNoiseReport};
 
 use crate::calibration::tenths;
-use crate::document::{Block, Document, left, number, right};
+use crate::document::{Document, DocumentBlock, left, number, right};
 use crate::figure::{BLUE, Band, Figure, FigureError, ORANGE, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, words};
@@ -105,13 +105,13 @@ impl Answer for SensorNoiseReport {
             right("least it resolves"),
         ];
         let rows = self.columns.iter().flat_map(|c| c.coefficients.iter().map(move |k| row(c, k)));
-        let mut blocks = vec![Block::table("Noise coefficients (IEEE Std 952-1997)", columns, rows)];
+        let mut blocks = vec![DocumentBlock::table("Noise coefficients (IEEE Std 952-1997)", columns, rows)];
         if !self.simulation_table.is_empty() {
             let lines = self.simulation_table.lines().map(Into::into).collect();
-            blocks.push(Block::list("For a scheme file", lines));
+            blocks.push(DocumentBlock::list("For a scheme file", lines));
         }
-        blocks.extend(Block::list_if_any("How noise maps to settings", self.notes.clone()));
-        blocks.push(Block::list("Record and fits", statements(self)));
+        blocks.extend(DocumentBlock::list_if_any("How noise maps to settings", self.notes.clone()));
+        blocks.push(DocumentBlock::list("Record and fits", statements(self)));
         for c in &self.columns {
             let columns = [
                 right("cluster time [s]"),
@@ -125,7 +125,7 @@ impl Answer for SensorNoiseReport {
                 [d.tau_s, d.deviation, d.low, d.high, d.degrees_of_freedom, d.fitted].map(number).to_vec()
             });
             let heading = format!("Overlapping Allan deviation of {}, in {}", c.column, c.unit);
-            blocks.push(Block::table(heading, columns, rows));
+            blocks.push(DocumentBlock::table(heading, columns, rows));
         }
         Document { title: format!("Noise of the sensors in {}", self.record), lead, blocks }
     }

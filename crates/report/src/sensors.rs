@@ -4,7 +4,7 @@ use obsdeg_core::system::NumberOfSolutions;
 use obsdeg_design::sensors::{CountedSets, FrontSet, SensorUnknown, Sensors, Unattainable};
 
 use crate::Answer;
-use crate::document::{Block, Document, left, right};
+use crate::document::{Document, DocumentBlock, left, right};
 use crate::stated::capital;
 use crate::words;
 
@@ -276,8 +276,11 @@ impl Answer for Sensors {
         if !self.front.is_empty() {
             let rows = self.front.iter().map(|f| of_set(&f.outputs, f.cost, f.degree));
             let name = if costs { "Cost against degree" } else { "Outputs against degree" };
-            blocks.push(Block::table(name, columns(), rows));
-            blocks.push(Block::list("Nothing cheaper", self.front.iter().map(|f| proof(self, f)).collect()));
+            blocks.push(DocumentBlock::table(name, columns(), rows));
+            blocks.push(DocumentBlock::list(
+                "Nothing cheaper",
+                self.front.iter().map(|f| proof(self, f)).collect(),
+            ));
         }
         if !self.sets.is_empty() {
             let all = self.minimal_sets.is_some_and(|n| n == self.sets.len());
@@ -287,7 +290,7 @@ impl Answer for Sensors {
                 (false, None) => format!("The first {} minimal sets", self.sets.len()),
             };
             let rows = self.sets.iter().map(|s| of_set(&s.outputs, s.cost, s.degree));
-            blocks.push(Block::table(heading, columns(), rows));
+            blocks.push(DocumentBlock::table(heading, columns(), rows));
         }
         let rows = self.quantities.iter().map(unknown_row);
         let header = [left("unknown"), left("cheapest set"), right("degree"), right("degree with all")];
@@ -295,7 +298,7 @@ impl Answer for Sensors {
             None => "Cheapest set of each unknown",
             Some(_) => "Cheapest set that makes each unknown observable, with any number of solutions",
         };
-        blocks.push(Block::table(name, header, rows));
+        blocks.push(DocumentBlock::table(name, header, rows));
         let rows = self.candidates.iter().map(|c| {
             let mut row = vec![c.name.clone()];
             row.extend(costs.then(|| cost(c.cost)));
@@ -305,8 +308,8 @@ impl Answer for Sensors {
         let mut header = vec![left("candidate")];
         header.extend(costs.then(|| right("cost")));
         header.extend([right("observable"), right("degree")]);
-        blocks.push(Block::table("Each candidate alone", header, rows));
-        blocks.push(Block::list("Validity", validity(self)));
+        blocks.push(DocumentBlock::table("Each candidate alone", header, rows));
+        blocks.push(DocumentBlock::list("Validity", validity(self)));
         let kept = match self.own_outputs.is_empty() {
             true => "in place of its outputs".to_string(),
             false => format!("beside {}", self.own_outputs.join(", ")),

@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
 use crate::figures::file_name;
-use crate::{Answer, Format, Layout, ReportError, written};
+use crate::{Answer, Format, ReportError, TerminalLayout, written};
 
 /// A unit as a part of a column name: `deg/h/g` is `dph_per_g`, `mg/l` is `mg_per_l`.
 fn suffix(unit: &str) -> String {
@@ -102,7 +102,7 @@ pub fn series_parquet(record: &Traces, summary: &impl Answer) -> Result<Vec<u8>,
 }
 
 fn metadata(columns: &[SeriesColumn], summary: &impl Answer) -> Result<Vec<KeyValue>, ReportError> {
-    let text = written(summary, Format::Json, Layout::default())?;
+    let text = written(summary, Format::Json, TerminalLayout::default())?;
     let digest: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
     let json: Value = serde_json::from_str(&text)?;
     let units: Map<String, Value> =

@@ -8,7 +8,7 @@ use obsdeg_evidence::simulation::{
     Simulation, TimelineReport, Validity,
 };
 
-use crate::document::{Block, Document, left, number, optional, right};
+use crate::document::{Document, DocumentBlock, left, number, optional, right};
 use crate::{Answer, gimbals, omitted, stated, words};
 
 /// Assumptions of a run, one sentence each.
@@ -261,12 +261,13 @@ fn degree_heading(s: &Simulation) -> &'static str {
 }
 
 /// Tables of the estimates of unknowns and of combinations.
-fn estimates(s: &Simulation) -> Vec<Block> {
+fn estimates(s: &Simulation) -> Vec<DocumentBlock> {
     let mut columns = vec![left("unknown"), left("unit")];
     columns.extend(words::ESTIMATE.map(right));
     columns.extend([right("predicted"), right("at [s]"), left("outcome")]);
-    let table =
-        |heading: &str, rows: &[Estimate]| Block::table(heading, columns.clone(), rows.iter().map(row));
+    let table = |heading: &str, rows: &[Estimate]| {
+        DocumentBlock::table(heading, columns.clone(), rows.iter().map(row))
+    };
     let degree = degree_heading(s);
     let bench = match s.requirements.with_bench {
         true => ", where the total with the bench does; reached: the total",
@@ -286,11 +287,11 @@ fn estimates(s: &Simulation) -> Vec<Block> {
 }
 
 /// Table of the linear filter on the same measurements.
-fn beside_linear(s: &Simulation) -> Block {
+fn beside_linear(s: &Simulation) -> DocumentBlock {
     let numbers = ["sigma", "linear: sigma", "error", "in sigma"].map(right);
     let columns: Vec<_> = [left("unknown"), left("unit")].into_iter().chain(numbers).collect();
     let rows = s.quantities.iter().chain(&s.combinations).filter_map(linear);
-    Block::table("Beside it, the linear filter on the same measurements", columns, rows)
+    DocumentBlock::table("Beside it, the linear filter on the same measurements", columns, rows)
 }
 
 /// Sentences on the consistency of the run.
@@ -305,14 +306,14 @@ fn consistency(s: &Simulation) -> Vec<String> {
 }
 
 /// Noise floor of the coefficients, with its meaning.
-fn noise_floor(f: &NoiseFloor) -> [Block; 2] {
+fn noise_floor(f: &NoiseFloor) -> [DocumentBlock; 2] {
     let mut columns = vec![left("coefficient"), left("unit")];
     columns.extend(words::FLOOR.map(right));
     let row = |c: &CoefficientFloor| [vec![c.name.clone(), c.unit.clone()], words::floor(c).into()].concat();
     let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(words::floor_of(f));
     [
-        Block::table("Noise floor", columns, f.coefficients.iter().map(row)),
-        Block::list("Noise floor: what it is", means.collect()),
+        DocumentBlock::table("Noise floor", columns, f.coefficients.iter().map(row)),
+        DocumentBlock::list("Noise floor: what it is", means.collect()),
     ]
 }
 
@@ -335,23 +336,23 @@ impl Answer for Simulation {
 
     fn document(&self) -> Document {
         let mut blocks = estimates(self);
-        blocks.extend(Block::list_if_any(
+        blocks.extend(DocumentBlock::list_if_any(
             "Known from the prior only: on which priors",
             priors(&self.quantities, self.filter.kind),
         ));
         blocks.extend(omitted::blocks(&self.omitted, ""));
-        blocks.push(Block::list("Filter", filter(&self.filter)));
+        blocks.push(DocumentBlock::list("Filter", filter(&self.filter)));
         if self.filter.kind != FilterKind::Linear {
             blocks.push(beside_linear(self));
         }
-        blocks.push(Block::list("Consistency", consistency(self)));
-        blocks.push(Block::list(
+        blocks.push(DocumentBlock::list("Consistency", consistency(self)));
+        blocks.push(DocumentBlock::list(
             "Validity of the small-angle model",
             validity(&self.validity, &self.conditions),
         ));
         blocks.extend(self.noise_floor.iter().flat_map(noise_floor));
         blocks.extend(gimbals::block(self.gimbals.as_ref()));
-        blocks.push(Block::list("Assumed", assumed(self)));
+        blocks.push(DocumentBlock::list("Assumed", assumed(self)));
         let positions = self.timeline.iter().filter(|t| !t.slew).count();
         let end = self.timeline.last().map_or(0.0, |t| t.end_s);
         Document {

@@ -9,7 +9,7 @@ use obsdeg_evidence::crosscheck::Agreement;
 use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence, SystemQuantityEvidence, SystemRun};
 
-use crate::document::{Block, Document, Typeset, left, number, right};
+use crate::document::{Document, DocumentBlock, Typeset, left, number, right};
 use crate::{Answer, Explanation, latex, resolve, why, words};
 
 /// Length in bytes up to which a solving expression is printed.
@@ -102,7 +102,7 @@ fn values_of(c: &SystemCombination) -> String {
 }
 
 /// Combinations with their verdicts. `unproven` is the largest order of derivatives if the end is not proven.
-fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usize>) -> Block {
+fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usize>) -> DocumentBlock {
     let row = |c: &SystemCombination| {
         let verdict = match (c.degree, unproven) {
             (Some(_), _) => values_of(c),
@@ -111,7 +111,11 @@ fn combinations(heading: &str, list: &[SystemCombination], unproven: Option<usiz
         };
         vec![c.expression.clone(), verdict, words::degree(c.degree)]
     };
-    Block::table(heading, [left("combination"), left("status"), right("degree")], list.iter().map(row))
+    DocumentBlock::table(
+        heading,
+        [left("combination"), left("status"), right("degree")],
+        list.iter().map(row),
+    )
 }
 
 /// The side of branches in time to which verdicts at a generic time are limited: ` where t - 7 < 0`; empty if
@@ -144,13 +148,13 @@ fn branch(a: &SystemAnalysis) -> String {
 }
 
 /// Table of the verdicts on unknowns, in the order given.
-fn verdicts(a: &SystemAnalysis, order: &[&SystemQuantity]) -> Block {
+fn verdicts(a: &SystemAnalysis, order: &[&SystemQuantity]) -> DocumentBlock {
     let units = a.quantities.iter().any(|q| !q.unit.is_empty());
     let rows = order.iter().map(|q| verdict_row(a, q, units));
     let mut columns = vec![left("unknown"), left("kind")];
     columns.extend(units.then(|| left("unit")));
     columns.extend([left("status"), right("degree"), left("explanation")]);
-    Block::table("Verdicts", columns, rows)
+    DocumentBlock::table("Verdicts", columns, rows)
 }
 
 /// Verdict on an unknown; with its unit if any unknown has one.
@@ -186,7 +190,7 @@ fn solved_by(q: &SystemQuantity) -> Option<Typeset> {
 }
 
 /// Changes of unknowns that no output shows; `None` without any.
-fn directions(a: &SystemAnalysis) -> Option<Block> {
+fn directions(a: &SystemAnalysis) -> Option<DocumentBlock> {
     let mut lines: Vec<String> = a.symmetries.iter().map(|s| s.words.clone()).collect();
     let silent = a.quantities.iter().filter(|q| q.status == Status::NotExcited);
     lines.extend(silent.map(|q| format!("change {} alone", q.name)));
@@ -203,7 +207,7 @@ fn directions(a: &SystemAnalysis) -> Option<Block> {
         }
         false => "No output changes when you".into(),
     };
-    Block::list_if_any(&heading, lines)
+    DocumentBlock::list_if_any(&heading, lines)
 }
 
 /// Conditions of the verdicts, one sentence each.
@@ -354,7 +358,7 @@ impl Answer for SystemAnalysis {
         order.sort_by_key(|q| (q.status, q.degree));
         let mut blocks = why::blocks(&self.why);
         blocks.push(verdicts(self, &order));
-        blocks.extend(Block::formulas("Solved by", order.iter().filter_map(|q| solved_by(q))));
+        blocks.extend(DocumentBlock::formulas("Solved by", order.iter().filter_map(|q| solved_by(q))));
         let unproven = self.rests_on_bound.then_some(self.last_order);
         if !self.combinations.is_empty() {
             blocks.push(combinations("Combinations asked for", &self.combinations, unproven));
@@ -365,12 +369,12 @@ impl Answer for SystemAnalysis {
         if self.unobservable_directions > 0 {
             blocks.extend(directions(self));
         }
-        blocks.extend(Block::list_if_any(
+        blocks.extend(DocumentBlock::list_if_any(
             "Every solution has another one with the same outputs, which appears when you",
             self.solution_maps.clone(),
         ));
-        blocks.push(Block::list("The system", self.equations.clone()));
-        blocks.push(Block::list("Assumed", assumed(self)));
+        blocks.push(DocumentBlock::list("The system", self.equations.clone()));
+        blocks.push(DocumentBlock::list("Assumed", assumed(self)));
         let profile = words::list(&self.rank_profile);
         let mut lead = self.sentences();
         lead.extend((!self.description.is_empty()).then(|| self.description.clone()));
@@ -424,7 +428,7 @@ impl Answer for SystemRun {
         let mut columns = vec![left("unknown"), left("unit"), left("status")];
         columns.extend(words::ESTIMATE.map(right));
         columns.push(right("prior sigma"));
-        let table = Block::table(
+        let table = DocumentBlock::table(
             "Estimates at the end (verdict and degree: exact, and what the run makes of it)",
             columns,
             self.quantities.iter().map(row),
@@ -458,7 +462,11 @@ impl Answer for SystemRun {
         Document {
             title: format!("Simulation: {}", self.name),
             lead: Vec::new(),
-            blocks: vec![table, Block::list("Consistency", consistency), Block::list("Assumed", assumed)],
+            blocks: vec![
+                table,
+                DocumentBlock::list("Consistency", consistency),
+                DocumentBlock::list("Assumed", assumed),
+            ],
         }
     }
 }
@@ -489,7 +497,7 @@ fn agreement(q: &SystemQuantityEvidence) -> &'static str {
 }
 
 /// Table of slopes and inflations, unknown by unknown.
-fn information(e: &SystemEvidence) -> Block {
+fn information(e: &SystemEvidence) -> DocumentBlock {
     let row = |q: &SystemQuantityEvidence| {
         vec![
             q.name.clone(),
@@ -502,7 +510,7 @@ fn information(e: &SystemEvidence) -> Block {
             agreement(q).into(),
         ]
     };
-    Block::table(
+    DocumentBlock::table(
         "Information of the samples, linearised along the true run",
         [
             left("unknown"),
@@ -519,7 +527,7 @@ fn information(e: &SystemEvidence) -> Block {
 }
 
 /// Directions that no output sees, against the singular values of the information.
-fn unseen_directions(e: &SystemEvidence) -> Block {
+fn unseen_directions(e: &SystemEvidence) -> DocumentBlock {
     let mut null: Vec<String> = e
         .symmetries
         .iter()
@@ -541,7 +549,7 @@ fn unseen_directions(e: &SystemEvidence) -> Block {
         e.defect.measured,
         said(e.defect.outcome)
     ));
-    Block::list(heading, null)
+    DocumentBlock::list(heading, null)
 }
 
 /// Meaning of the figures, and their certainty.
@@ -598,7 +606,7 @@ impl Answer for SystemEvidence {
     }
 
     fn document(&self) -> Document {
-        let blocks = vec![information(self), unseen_directions(self), Block::list("How", how(self))];
+        let blocks = vec![information(self), unseen_directions(self), DocumentBlock::list("How", how(self))];
         Document { title: format!("Cross-check: {}", self.name), lead: vec![outcome(self)], blocks }
     }
 }

@@ -6,7 +6,7 @@ use obsdeg_calibration::system::{
 };
 
 use crate::calibration::{COEFFICIENTS, with_coefficients};
-use crate::document::{Block, Document, estimate, left, number, optional, right};
+use crate::document::{Document, DocumentBlock, estimate, left, number, optional, right};
 use crate::figure::{BLACK, BLUE, Band, FigureError, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
 use crate::{Answer, ReportError, Table, words};
@@ -101,7 +101,7 @@ fn lead(c: &SystemCalibration) -> Vec<String> {
 }
 
 /// Tables of the estimates of unknowns and of combinations.
-fn estimates(c: &SystemCalibration) -> Vec<Block> {
+fn estimates(c: &SystemCalibration) -> Vec<DocumentBlock> {
     let columns = [
         left("unknown"),
         left("unit"),
@@ -111,13 +111,13 @@ fn estimates(c: &SystemCalibration) -> Vec<Block> {
         right("rescaled"),
         left("status"),
     ];
-    let mut blocks = vec![Block::table(
+    let mut blocks = vec![DocumentBlock::table(
         "Estimates (degree: exact verdict; states: at the start)",
         columns.clone(),
         c.quantities.iter().map(row),
     )];
     if !c.combinations.is_empty() {
-        blocks.push(Block::table(
+        blocks.push(DocumentBlock::table(
             "Combinations of what is not told apart, and those asked for",
             columns,
             c.combinations.iter().map(row),
@@ -157,7 +157,7 @@ fn fit(c: &SystemCalibration) -> Vec<String> {
 }
 
 /// Table of the outputs: noise, residuals and outliers.
-fn outputs(c: &SystemCalibration) -> Block {
+fn outputs(c: &SystemCalibration) -> DocumentBlock {
     let columns = [
         left("output"),
         right("measured"),
@@ -182,7 +182,7 @@ fn outputs(c: &SystemCalibration) -> Block {
             o.outlier_gate.map_or_else(|| "too few to tell".into(), number),
         ]
     });
-    Block::table(
+    DocumentBlock::table(
         "Outputs (root mean squares of what is left, and of what sigmas let expect; outlier: in sigma as \
          all others have it)",
         columns,
@@ -191,20 +191,20 @@ fn outputs(c: &SystemCalibration) -> Block {
 }
 
 /// Other solutions that fit nearly as well; `None` without any.
-fn other_solutions(c: &SystemCalibration) -> Option<Block> {
+fn other_solutions(c: &SystemCalibration) -> Option<DocumentBlock> {
     let names: Vec<&str> = c.quantities.iter().map(|u| u.name.as_str()).collect();
     let of = |o: &OtherSolution| {
         let values: Vec<String> =
             names.iter().zip(&o.values).map(|(n, v)| format!("{n} = {}", number(*v))).collect();
         format!("chi-square {} from {} starts: {}", number(o.chi_square), o.starts, values.join(", "))
     };
-    Block::list_if_any("Other solutions", c.others.iter().map(of).collect())
+    DocumentBlock::list_if_any("Other solutions", c.others.iter().map(of).collect())
 }
 
 /// Table of chi-square along one unknown.
-fn profile(p: &Profile) -> Block {
+fn profile(p: &Profile) -> DocumentBlock {
     let flat = if p.flat { ": FLAT, the data say nothing of it" } else { "" };
-    Block::table(
+    DocumentBlock::table(
         format!("Profile of {}{flat}", p.name),
         [right("value"), right("chi-square more")],
         p.points.iter().map(|(x, c)| vec![number(*x), number(*c)]),
@@ -257,11 +257,11 @@ impl Answer for SystemCalibration {
 
     fn document(&self) -> Document {
         let mut blocks = estimates(self);
-        blocks.push(Block::list("Fit", fit(self)));
+        blocks.push(DocumentBlock::list("Fit", fit(self)));
         blocks.push(outputs(self));
         blocks.extend(other_solutions(self));
         blocks.extend(self.profiles.iter().map(profile));
-        blocks.push(Block::list("Read", read(self)));
+        blocks.push(DocumentBlock::list("Read", read(self)));
         Document { title: format!("Calibration: {}", self.name), lead: lead(self), blocks }
     }
 

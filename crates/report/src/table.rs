@@ -2,16 +2,16 @@
 
 use std::borrow::Cow;
 
-use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableCell, TableStyle};
 
-use crate::document::{Block, Column, Document};
-use crate::{Layout, visible};
+use crate::document::{Document, DocumentBlock, TableColumn};
+use crate::{TerminalLayout, visible};
 
 /// Table with one line under the header and no other.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// Section heading; nothing if it is empty.
-fn heading(out: &mut String, text: &str, layout: Layout) {
+fn heading(out: &mut String, text: &str, layout: TerminalLayout) {
     if text.is_empty() {
         return;
     }
@@ -28,7 +28,7 @@ fn heading(out: &mut String, text: &str, layout: Layout) {
 }
 
 /// Adds lines with a hanging indent.
-fn paragraph(out: &mut String, text: &str, layout: Layout) {
+fn paragraph(out: &mut String, text: &str, layout: TerminalLayout) {
     for line in wrapped(text, layout, "  ", "      ") {
         out.push_str(&line);
         out.push('\n');
@@ -36,7 +36,7 @@ fn paragraph(out: &mut String, text: &str, layout: Layout) {
 }
 
 /// Lines of the layout's width, broken between words, with one indent for the first and another for the rest.
-fn wrapped(text: &str, layout: Layout, first: &str, others: &str) -> Vec<String> {
+fn wrapped(text: &str, layout: TerminalLayout, first: &str, others: &str) -> Vec<String> {
     let width = layout.width.map_or(usize::MAX, usize::from).max(20);
     let (mut lines, mut line, mut empty) = (Vec::new(), String::from(first), true);
     for word in visible(text).split(' ') {
@@ -55,7 +55,12 @@ fn wrapped(text: &str, layout: Layout, first: &str, others: &str) -> Vec<String>
     lines
 }
 
-fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell>], layout: Layout) {
+fn table(
+    out: &mut String,
+    columns: &[TableColumn],
+    rows: &[Vec<crate::document::TableCell>],
+    layout: TerminalLayout,
+) {
     let mut table = Table::new();
     table.load_style(STYLE).set_header(columns.iter().map(|c| visible(&c.name)));
     if let Some(width) = layout.width {
@@ -66,7 +71,7 @@ fn table(out: &mut String, columns: &[Column], rows: &[Vec<crate::document::Cell
             let side = if column.number { CellAlignment::Right } else { CellAlignment::Left };
             let graded = layout.color && GRADED.contains(&column.name.as_ref());
             let text = if graded { marked(&cell.text) } else { visible(&cell.text) };
-            Cell::new(text).set_alignment(side)
+            TableCell::new(text).set_alignment(side)
         });
         table.add_row(aligned);
     }
@@ -112,37 +117,38 @@ fn marked(text: &str) -> Cow<'_, str> {
 }
 
 /// Writes blocks; `left_out` receives the headings of details that are not written.
-fn blocks(out: &mut String, all: &[Block], layout: Layout, left_out: &mut Vec<String>) {
+fn blocks(out: &mut String, all: &[DocumentBlock], layout: TerminalLayout, left_out: &mut Vec<String>) {
     for block in all {
         match block {
-            Block::Table { heading: title, columns, rows } => {
+            DocumentBlock::Table { heading: title, columns, rows } => {
                 heading(out, title, layout);
                 table(out, columns, rows, layout);
             }
-            Block::List { heading: title, lines } => {
+            DocumentBlock::List { heading: title, lines } => {
                 heading(out, title, layout);
                 lines.iter().for_each(|line| paragraph(out, line, layout));
             }
-            Block::Section { title, .. } => heading(out, title, layout),
-            Block::Text(text) => paragraph(out, text, layout),
-            Block::Formulas { heading: title, lines } => {
+            DocumentBlock::Section { title, .. } => heading(out, title, layout),
+            DocumentBlock::Text(text) => paragraph(out, text, layout),
+            DocumentBlock::Formulas { heading: title, lines } => {
                 heading(out, title, layout);
                 lines.iter().for_each(|line| paragraph(out, &line.text, layout));
             }
-            Block::Fold(fold) if fold.printed || !layout.brief => {
+            DocumentBlock::Fold(fold) if fold.printed || !layout.brief => {
                 blocks(out, &fold.blocks, layout, left_out);
             }
-            Block::Fold(fold) => left_out.extend(fold.blocks.iter().filter_map(short_heading)),
+            DocumentBlock::Fold(fold) => left_out.extend(fold.blocks.iter().filter_map(short_heading)),
             // a status is a table here
-            Block::Picture(_) | Block::Status(_) | Block::NewPage => {}
+            DocumentBlock::Picture(_) | DocumentBlock::Status(_) | DocumentBlock::NewPage => {}
         }
     }
 }
 
 /// Heading of a block, without what explains it in brackets or behind a colon; `None` without a heading.
-fn short_heading(block: &Block) -> Option<String> {
-    let (Block::Table { heading, .. } | Block::List { heading, .. } | Block::Formulas { heading, .. }) =
-        block
+fn short_heading(block: &DocumentBlock) -> Option<String> {
+    let (DocumentBlock::Table { heading, .. }
+    | DocumentBlock::List { heading, .. }
+    | DocumentBlock::Formulas { heading, .. }) = block
     else {
         return None;
     };
@@ -150,7 +156,7 @@ fn short_heading(block: &Block) -> Option<String> {
     (!short.is_empty()).then(|| short.into())
 }
 
-pub(crate) fn document(d: &Document, layout: Layout) -> String {
+pub(crate) fn document(d: &Document, layout: TerminalLayout) -> String {
     let mut out = String::new();
     heading(&mut out, &d.title, layout);
     for line in &d.lead {

@@ -3,7 +3,7 @@
 use obsdeg_design::design::Walks;
 
 use crate::Answer;
-use crate::document::{Block, Document, left, right};
+use crate::document::{Document, DocumentBlock, left, right};
 use crate::words::{at_most, reasons};
 
 /// Sentences on the examined slew sequences and their consequence.
@@ -80,9 +80,9 @@ impl Answer for Walks {
             title,
             lead: vec![summary],
             blocks: vec![
-                Block::table("", columns, rows),
-                Block::list("Fewer", examined(self)),
-                Block::list(
+                DocumentBlock::table("", columns, rows),
+                DocumentBlock::list("Fewer", examined(self)),
+                DocumentBlock::list(
                     "Searched",
                     vec![
                         format!(

@@ -5,24 +5,24 @@ use obsdeg_core::remedies::Change;
 use obsdeg_core::why::{Assumption, AssumptionKind, Improvement, OutputDerivative, UnseenDirection, Why};
 use serde::Serialize;
 
-use crate::document::{Block, left, right};
+use crate::document::{DocumentBlock, left, right};
 use crate::resolve::changes;
 use crate::words::{self, names};
 
 /// Blocks of all explanations.
-pub(crate) fn blocks(all: &[Why]) -> Vec<Block> {
+pub(crate) fn blocks(all: &[Why]) -> Vec<DocumentBlock> {
     all.iter().flat_map(of).collect()
 }
 
-fn of(why: &Why) -> Vec<Block> {
+fn of(why: &Why) -> Vec<DocumentBlock> {
     let Explanation { heading, lines, improvements, columns, rows, no_change } = Explanation::new(why);
     let [change, degree, more, loses] = columns;
     let columns = [left(change), right(degree), left(more), left(loses)];
     let improvements = match rows.is_empty() {
-        true => Block::list(improvements, vec![no_change.into()]),
-        false => Block::table(improvements, columns, rows.into_iter().map(Vec::from)),
+        true => DocumentBlock::list(improvements, vec![no_change.into()]),
+        false => DocumentBlock::table(improvements, columns, rows.into_iter().map(Vec::from)),
     };
-    vec![Block::list(heading, lines), improvements]
+    vec![DocumentBlock::list(heading, lines), improvements]
 }
 
 /// Explanation of one verdict in words.

@@ -7,7 +7,7 @@ use obsdeg_core::analysis::{
 };
 use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
-use obsdeg_core::model::{Carry, Geometry, Scheme, Source, Term, Unknowns, omitted_unit, parse_attitude};
+use obsdeg_core::model::{Carry, Geometry, Scheme, ErrorSource, Term, Unknowns, omitted_unit, parse_attitude};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::simulation::{
     AccelerometerBias, CoefficientFloor, Consistency, Doubt, GyroNoise, NoiseFloor, Outcome, Reached,
@@ -222,8 +222,8 @@ pub(crate) fn carry(of: Carry) -> &'static str {
 /// Assumptions, one sentence each.
 pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     let terms: Vec<Term> = a.terms.parse::<Unknowns>().map(|u| u.terms().to_vec()).unwrap_or_default();
-    let has = |source: Source| terms.iter().any(|t| t.source() == source);
-    let has_others = has(Source::Rate) || has(Source::Force);
+    let has = |source: ErrorSource| terms.iter().any(|t| t.source() == source);
+    let has_others = has(ErrorSource::Rate) || has(ErrorSource::Force);
     let mut out = vec![
         format!("carry {}", carry(a.carry)),
         format!("latitude {}", latitude(a.latitude_deg)),
@@ -233,11 +233,11 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
             if has_others { "unknown terms" } else { "drift terms" },
             a.terms
         ),
-        format!("observation {}", observation(a.frame, has(Source::Force))),
-        units(has(Source::Rate), has(Source::Force)),
+        format!("observation {}", observation(a.frame, has(ErrorSource::Force))),
+        units(has(ErrorSource::Rate), has(ErrorSource::Force)),
     ];
-    out.extend(has(Source::Force).then(|| accelerometers(&a.geometry)));
-    if has(Source::Rate) {
+    out.extend(has(ErrorSource::Force).then(|| accelerometers(&a.geometry)));
+    if has(ErrorSource::Rate) {
         out.push(
             "torquer errors GS and GM are drifts along the input axis: GS times the torqued rate along it, \
              GM_XY that of gyro X times the torqued rate along the input axis of gyro Y; at a position that \
@@ -254,7 +254,7 @@ pub(crate) fn assumptions(a: &Analysis) -> Vec<String> {
     }
     out.extend(rotations(a, has_others).map(String::from));
     out.extend(turned_station(a, has_others));
-    out.extend(local_drift(a, has(Source::Rate)));
+    out.extend(local_drift(a, has(ErrorSource::Rate)));
     if a.stations.len() > 1 && a.quantities.iter().any(|q| q.solution.is_some()) {
         out.push(
             "solutions take psi as it is carried from station to station: what the dwells change in it is \

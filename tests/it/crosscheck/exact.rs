@@ -4,7 +4,7 @@ use obsdeg_core::model::settings::{Assignment, FilterKind, Truth};
 use obsdeg_core::model::{Carry, Scheme};
 use obsdeg_evidence::crosscheck::{CrossCheck, Experiment, FilterChange, Prepared, Statistic};
 use obsdeg_evidence::simulation::{Conditions, Plan};
-use obsdeg_report::{Format, Layout};
+use obsdeg_report::{Format, TerminalLayout};
 
 use super::check;
 use crate::schemes::{S6, paper, scheme};
@@ -99,7 +99,7 @@ fn exact_truth_fails_the_linear_filter_at_the_papers_drifts_and_passes_at_a_thou
     // the model of the runs fails, not a verdict
     assert!(c.verdicts_agree && c.quantities.iter().all(|q| !q.slope.fails() && !q.inflation.fails()));
     let title = |c: &CrossCheck| {
-        let text = obsdeg_report::written(c, Format::Table, Layout::default()).expect("text");
+        let text = obsdeg_report::written(c, Format::Table, TerminalLayout::default()).expect("text");
         text.lines().next().unwrap_or_default().to_string()
     };
     assert_eq!(

@@ -14,7 +14,7 @@ use obsdeg_evidence::crosscheck::{
     Agreement, CrossCheck, CrossCheckOptions, Experiment, FilterChange, Prepared, crosscheck,
 };
 use obsdeg_evidence::simulation::{Conditions, Plan, batch};
-use obsdeg_report::{Format, Layout};
+use obsdeg_report::{Format, TerminalLayout};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
@@ -417,7 +417,7 @@ fn what_is_not_resolvable_is_no_disagreement() {
     let c = crosscheck(&s, &Conditions::default(), &options, &|_| true).expect("checked");
     assert!(c.passed && c.counts.not_resolvable > 0 && c.counts.disagree == 0, "{:?}", c.disagreements);
     assert!(c.quantities.iter().any(|q| q.inflation.outcome == Agreement::NotResolvable));
-    let text = obsdeg_report::written(&c, Format::Table, Layout::default()).expect("text");
+    let text = obsdeg_report::written(&c, Format::Table, TerminalLayout::default()).expect("text");
     let line = format!(
         "checks: {} agree, 0 disagree, {} not resolvable, {} not tested",
         c.counts.agree, c.counts.not_resolvable, c.counts.not_tested

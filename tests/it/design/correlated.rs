@@ -7,7 +7,7 @@ use obsdeg_core::model::{Angle, Carry, Scheme};
 use obsdeg_design::design::{
     Candidates, Criterion, CriterionName, DesignError, DesignOptions, Evaluator, design, scheme_found,
 };
-use obsdeg_ekf::{Form, linear::covariance_pass};
+use obsdeg_ekf::{CovarianceForm, linear::covariance_pass};
 use obsdeg_evidence::simulation::{Conditions, Plan, RunStart, simulate};
 use obsdeg_exact::SplitMix64;
 
@@ -190,7 +190,7 @@ fn sigmas_are_those_of_a_filter_with_biases() {
             let plan = Plan::new(&scheme, &conditions).expect("a plan");
             assert_eq!(plan.states(), plan.unknowns() + 3);
             let prior =
-                RunStart::new(&plan, &conditions).expect("a start").covariance(Form::Ud).expect("a prior");
+                RunStart::new(&plan, &conditions).expect("a start").covariance(CovarianceForm::Ud).expect("a prior");
             let mut last = Vec::new();
             covariance_pass(&plan.stages, prior, |_, p| last = p.sigmas()).expect("a pass");
             let count = plan.platform.coefficients();

@@ -6,7 +6,7 @@ use std::path::Path;
 use obsdeg_commands::{Designed, Host, Search, SearchFiles};
 use obsdeg_core::model::{Euler, Gimbals, c_n_f64, cardinal, parse_attitude, scheme_file};
 use obsdeg_exact::SplitMix64;
-use obsdeg_report::{Format, Layout, written};
+use obsdeg_report::{Format, TerminalLayout, written};
 
 use crate::program::{run, stderr, stdout};
 
@@ -118,7 +118,7 @@ fn within(tasks: usize, seed: u64) -> usize {
         }
         let names = [&design.candidates, &design.minimum.witness];
         let printed = [Format::Table, Format::Json, Format::Markdown]
-            .map(|format| written(searched.as_ref(), format, Layout::default()).expect("written"));
+            .map(|format| written(searched.as_ref(), format, TerminalLayout::default()).expect("written"));
         // attitudes of the bound over all attitudes, and attitudes reported as beyond the limits
         let beyond: Vec<&String> = design.beyond_gimbals.iter().collect();
         let every = design

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use obsdeg_core::analysis::{Analysis, AnalysisOptions, Quantity, analyze};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::solution::Frame;
-use obsdeg_report::{Format, Layout};
+use obsdeg_report::{Format, TerminalLayout};
 use obsdeg_symbolic::Worker;
 use serde_json::Value as Json;
 
@@ -117,7 +117,7 @@ fn check(draw: &RandomScheme, frame: Frame, worker: Option<&mut Worker>, seen: &
     let options =
         AnalysisOptions { seed: 1, solutions: true, formulas: worker.is_some(), frame, omitted: false };
     let a: Analysis = analyze(&scheme, options, worker).expect("analysed");
-    let written = |format| obsdeg_report::written(&a, format, Layout::default()).expect("written");
+    let written = |format| obsdeg_report::written(&a, format, TerminalLayout::default()).expect("written");
     let document = written(Format::Latex);
     let latex = latex_rows(&document);
     let json: Json = serde_json::from_str(&written(Format::Json)).expect("JSON");

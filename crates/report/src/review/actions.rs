@@ -2,7 +2,7 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{CellKind, ClockRate, Estimated, Finding, PositionFit};
-use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::degree::Status;
 use obsdeg_core::system::{NumberOfSolutions, SystemQuantity};
 use obsdeg_design::review::{ModelReview, SchemeReview};
 use obsdeg_evidence::compare::ComparedScheme;
@@ -72,7 +72,7 @@ fn unobservable(s: &SchemeReview, review: &ComparedScheme, required: Vec<&str>) 
     }
     let stated = review.requirements.stated;
     let open: Vec<&str> = (review.quantities.iter())
-        .filter(|q| stated == 0 && q.status != Exact::Observable && q.sigma.is_none())
+        .filter(|q| stated == 0 && q.status != Status::Observable && q.sigma.is_none())
         .filter(|q| !q.name.starts_with("psi"))
         .map(|q| q.name.as_str())
         .collect();
@@ -193,7 +193,7 @@ pub(super) fn of_model(m: &ModelReview, by_prior: &[&str]) -> Vec<String> {
         out.push("First explain the checks that fail (section Evidence by samples and a filter).".into());
     }
     out.extend(resolve::to_resolve_in_model(a));
-    let unseen = named(&|q| q.status == Exact::NotSeen);
+    let unseen = named(&|q| q.status == Status::NotSeen);
     if !unseen.is_empty() {
         out.push(format!(
             "Look at derivatives of orders above {} for {}: no end is proven.",
@@ -217,7 +217,7 @@ pub(super) fn of_model(m: &ModelReview, by_prior: &[&str]) -> Vec<String> {
     }
     // what is not observable has an action above
     let prior: Vec<&str> = (by_prior.iter().copied())
-        .filter(|name| a.quantities.iter().any(|q| q.name == *name && q.status == Exact::Observable))
+        .filter(|name| a.quantities.iter().any(|q| q.name == *name && q.status == Status::Observable))
         .collect();
     if !prior.is_empty() {
         out.push(format!(

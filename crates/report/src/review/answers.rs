@@ -6,7 +6,7 @@ use obsdeg_design::review::SchemeReview;
 use obsdeg_evidence::compare::ComparedScheme;
 
 use super::{actions, verdict};
-use crate::document::{Block, Cell, Grade, left, number};
+use crate::document::{DocumentBlock, Grade, TableCell, left, number};
 use crate::{omitted, resolve, stated, words};
 
 /// Heading of the table of answers.
@@ -19,17 +19,17 @@ pub(crate) struct Answers {
     /// Name of the scheme, model or calibration.
     pub(crate) name: String,
     /// Questions with their answers, in the order of the table.
-    pub(crate) rows: Vec<(&'static str, Cell)>,
+    pub(crate) rows: Vec<(&'static str, TableCell)>,
     /// First action, and the number of further ones. Of a single subject the box above has the actions.
     pub(crate) next: String,
 }
 
 /// Tables of the answers on all subjects of a report: of several first what is the same for all of them.
-pub(crate) fn tables(all: &[Answers]) -> Vec<Block> {
+pub(crate) fn tables(all: &[Answers]) -> Vec<DocumentBlock> {
     let [first, others @ ..] = all else { return Vec::new() };
     if others.is_empty() {
-        let rows = first.rows.iter().map(|(question, cell)| vec![Cell::from(*question), cell.clone()]);
-        return vec![Block::table(HEADING, [left("question"), left("answer")], rows)];
+        let rows = first.rows.iter().map(|(question, cell)| vec![TableCell::from(*question), cell.clone()]);
+        return vec![DocumentBlock::table(HEADING, [left("question"), left("answer")], rows)];
     }
     let mut questions: Vec<&str> = Vec::new();
     for (question, _) in all.iter().flat_map(|a| &a.rows) {
@@ -44,7 +44,7 @@ pub(crate) fn tables(all: &[Answers]) -> Vec<Block> {
     };
     let (mut alike, mut rows) = (Vec::new(), Vec::new());
     for question in questions {
-        let mut cells: Vec<Cell> = all.iter().map(|a| of(a, question)).collect();
+        let mut cells: Vec<TableCell> = all.iter().map(|a| of(a, question)).collect();
         match cells.iter().all(|c| c.text == cells[0].text && c.grade == cells[0].grade) {
             true => alike.push(vec![question.into(), cells.remove(0)]),
             false => rows.push([vec![question.into()], cells].concat()),
@@ -55,7 +55,7 @@ pub(crate) fn tables(all: &[Answers]) -> Vec<Block> {
     let same = format!("{HEADING}, the same for all {}", all.len());
     let both = [(HEADING.into(), columns, rows), (same, vec![left("question"), left("answer")], alike)];
     let written = both.into_iter().filter(|(.., rows)| !rows.is_empty());
-    written.map(|(heading, columns, rows)| Block::table(heading, columns, rows)).collect()
+    written.map(|(heading, columns, rows)| DocumentBlock::table(heading, columns, rows)).collect()
 }
 
 /// Answers on a scheme; `certified`: the report names digests of certificates.
@@ -128,7 +128,7 @@ fn chosen(s: &SchemeReview, review: &ComparedScheme) -> String {
 }
 
 /// Limits of the verdict, the unknowns without an answer and the least accurate coefficient.
-fn limits(s: &SchemeReview, review: &ComparedScheme) -> Cell {
+fn limits(s: &SchemeReview, review: &ComparedScheme) -> TableCell {
     let mut out = verdict::limits(s);
     let lost: Vec<&str> =
         (review.quantities.iter()).filter(|q| q.sigma.is_none()).map(|q| q.name.as_str()).collect();
@@ -161,7 +161,7 @@ fn limits(s: &SchemeReview, review: &ComparedScheme) -> Cell {
     if out.is_empty() {
         out.push("nothing found".into());
     }
-    Cell::graded(stated::capital(&out.join("; ")), grade)
+    TableCell::graded(stated::capital(&out.join("; ")), grade)
 }
 
 /// The two largest sources in the budget of an unknown; empty without a bench.
@@ -205,7 +205,7 @@ pub(super) fn proven(a: &Analysis, certified: bool) -> String {
 }
 
 /// Checks by a filter and by one run.
-fn verified(s: &SchemeReview) -> Cell {
+fn verified(s: &SchemeReview) -> TableCell {
     let (grade, evidence) = verdict::evidence(s);
     let consistent = s.simulation.consistency.consistent;
     let run = if consistent { "is consistent" } else { "is NOT consistent" };
@@ -216,7 +216,7 @@ fn verified(s: &SchemeReview) -> Cell {
     let text = format!(
         "Kalman filter and exact verdicts: {evidence}. One simulated run {run} with its truth{small}"
     );
-    Cell::graded(text, if consistent { grade } else { Grade::Limited })
+    TableCell::graded(text, if consistent { grade } else { Grade::Limited })
 }
 
 /// First action, and the number of further ones.

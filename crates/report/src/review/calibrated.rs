@@ -11,39 +11,41 @@ use crate::calibration_figures::{
     allan_figure, estimate_figures, file_name, residual_figure, whiteness_figure,
 };
 use crate::calibration_findings::finding;
-use crate::document::{Block, Cell, Document, Drawing, Grade, Picture, Status, StatusRow, number};
+use crate::document::{
+    Document, DocumentBlock, Drawing, Grade, Picture, StatusBox, StatusRow, TableCell, number,
+};
 use crate::figure::Figure;
 use crate::{acceptance, omitted, stated, words};
 
 /// Section of a calibration: its answer and its pictures, whose names begin with `id`.
-pub(super) fn section(c: &Calibration, id: &str) -> Vec<Block> {
+pub(super) fn section(c: &Calibration, id: &str) -> Vec<DocumentBlock> {
     let Document { lead, blocks, .. } = c.document();
     let Pictures { estimates, residuals, details } = pictures(c, id);
-    let text = lead.into_iter().map(Block::Text);
+    let text = lead.into_iter().map(DocumentBlock::Text);
     text.chain(blocks).chain(estimates).chain(residuals).chain(details).collect()
 }
 
 /// Pictures of a calibration.
 pub(crate) struct Pictures {
     /// Three sigma about the estimates by family.
-    pub(crate) estimates: Vec<Block>,
+    pub(crate) estimates: Vec<DocumentBlock>,
     /// Residuals over time by component.
-    pub(crate) residuals: Vec<Block>,
+    pub(crate) residuals: Vec<DocumentBlock>,
     /// Allan deviation and autocorrelation of the residuals by component.
-    pub(crate) details: Vec<Block>,
+    pub(crate) details: Vec<DocumentBlock>,
 }
 
 /// Pictures of a calibration; their names begin with `id`.
 pub(crate) fn pictures(c: &Calibration, id: &str) -> Pictures {
     let curves = |name: String, caption: String, figure: Figure| {
-        Block::Picture(Picture { name, caption, drawing: Drawing::Curves(Box::new(figure)) })
+        DocumentBlock::Picture(Picture { name, caption, drawing: Drawing::Curves(Box::new(figure)) })
     };
     let estimates = estimate_figures(c).into_iter().enumerate().map(|(i, mut figure)| {
         // the table of coefficients has the estimates
         for name in &mut figure.x_names {
             name.truncate(name.find(" = ").unwrap_or(name.len()));
         }
-        Block::Picture(Picture {
+        DocumentBlock::Picture(Picture {
             name: format!("{id}_estimates_{}", i + 1),
             caption: format!(
                 "Three sigma about the estimates of {}: rescaled by the fit, predicted, and required where a \
@@ -72,7 +74,7 @@ pub(crate) fn pictures(c: &Calibration, id: &str) -> Pictures {
         }
         if !s.autocorrelation.is_empty() {
             let caption = format!("Autocorrelation of the residuals of {what}{of}");
-            out.details.push(Block::Picture(Picture {
+            out.details.push(DocumentBlock::Picture(Picture {
                 name: name("whiteness"),
                 caption,
                 drawing: Drawing::Bars(Box::new(whiteness_figure(s))),
@@ -128,7 +130,7 @@ fn assumed_in_brief(c: &Calibration) -> String {
 }
 
 /// Findings, unknowns without an estimate, and the smallest margin.
-fn limits(c: &Calibration) -> Cell {
+fn limits(c: &Calibration) -> TableCell {
     let mut out: Vec<String> = c.findings.iter().take(1).map(|f| finding(f, &c.records)).collect();
     let more = c.findings.len().saturating_sub(1);
     out.extend((more > 0).then(|| format!("{more} more finding{} below", if more == 1 { "" } else { "s" })));
@@ -151,7 +153,7 @@ fn limits(c: &Calibration) -> Cell {
     if out.is_empty() {
         out.push("nothing found".into());
     }
-    Cell::graded(stated::capital(&out.join("; ")), grade)
+    TableCell::graded(stated::capital(&out.join("; ")), grade)
 }
 
 /// Positions of the record without which every estimate remains.
@@ -178,10 +180,10 @@ fn position_to_drop(c: &Calibration) -> String {
 }
 
 /// Second path, chi-square and agreement of several records.
-fn verified(c: &Calibration) -> Cell {
+fn verified(c: &Calibration) -> TableCell {
     let f = &c.fit;
     if !c.quantities.iter().any(|q| q.determined) {
-        return Cell::graded("Nothing to compare: no unknown is determined", Grade::Open);
+        return TableCell::graded("Nothing to compare: no unknown is determined", Grade::Open);
     }
     let mut out = vec![
         format!(
@@ -204,11 +206,11 @@ fn verified(c: &Calibration) -> Cell {
             number(r.band.1)
         )
     }));
-    Cell::graded(out.join("; "), if c.consistent { Grade::Good } else { Grade::Missed })
+    TableCell::graded(out.join("; "), if c.consistent { Grade::Good } else { Grade::Missed })
 }
 
 /// Status of a calibration.
-pub(crate) fn status(c: &Calibration, title: String) -> Status {
+pub(crate) fn status(c: &Calibration, title: String) -> StatusBox {
     let row = |what, grade, text| StatusRow { what, grade, text };
     let all = c.quantities.len();
     let determined = c.quantities.iter().filter(|u| u.determined).count();
@@ -232,7 +234,7 @@ pub(crate) fn status(c: &Calibration, title: String) -> Status {
         };
         Some(row("Acceptance", grade, acceptance::sentence(a)?))
     });
-    Status {
+    StatusBox {
         title,
         rows: required
             .into_iter()

@@ -1,7 +1,7 @@
 //! Beginning of a review: every unknown in one picture and the actions; for several schemes the comparison
 //! and the recommended scheme.
 
-use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::degree::Status;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_design::review::{DesignReview, GenericReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
@@ -10,7 +10,7 @@ use obsdeg_evidence::requirements::Requirements;
 use super::pictures::still;
 use super::{duration, joined};
 use crate::compare::{deciding, unknowns};
-use crate::document::{Block, Cell, Grade, Status, StatusRow, left, number};
+use crate::document::{DocumentBlock, Grade, StatusBox, StatusRow, TableCell, left, number};
 use crate::rows::{Chart, ChartRow};
 use crate::{compare, stated, words};
 
@@ -33,7 +33,7 @@ fn margin(q: &Quantity) -> (String, Grade) {
 }
 
 /// Picture of a chart; `all` is the number of rows before it was cut.
-fn chart(name: &str, caption: String, chart: Chart, all: usize) -> Block {
+fn chart(name: &str, caption: String, chart: Chart, all: usize) -> DocumentBlock {
     let shown = chart.rows.len();
     let part = if all > shown { format!(" ({shown} of {all})") } else { String::new() };
     still(name, format!("{caption}{part}"), chart.svg())
@@ -52,7 +52,7 @@ fn worst_rows<T>(all: Vec<T>, worse: impl Fn(&T) -> f64) -> Vec<T> {
 
 /// Degree and margin of every unknown of a scheme, best first, of many the smallest margins; degrees alone
 /// without requirements.
-pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Block {
+pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> DocumentBlock {
     let all = &s.analysis.quantities;
     if review.requirements.stated == 0 {
         return degrees(all.iter().map(|q| (q.name.as_str(), q.status, q.degree)), all.len(), id);
@@ -94,8 +94,12 @@ pub(super) fn margins(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Bl
 }
 
 /// Chart of the degrees alone, of many unknowns the largest.
-fn degrees<'a>(all: impl Iterator<Item = (&'a str, Exact, Option<usize>)>, count: usize, id: &str) -> Block {
-    let row = |(name, status, degree): (&str, Exact, Option<usize>)| ChartRow {
+fn degrees<'a>(
+    all: impl Iterator<Item = (&'a str, Status, Option<usize>)>,
+    count: usize,
+    id: &str,
+) -> DocumentBlock {
+    let row = |(name, status, degree): (&str, Status, Option<usize>)| ChartRow {
         name: name.into(),
         remark: words::degree(degree),
         marks: vec![degree.map(|k| k as f64)],
@@ -116,11 +120,11 @@ fn degrees<'a>(all: impl Iterator<Item = (&'a str, Exact, Option<usize>)>, count
     chart(&format!("{id}_degrees"), caption, picture, count)
 }
 
-pub(super) fn model_degrees(a: &SystemAnalysis, id: &str) -> Block {
+pub(super) fn model_degrees(a: &SystemAnalysis, id: &str) -> DocumentBlock {
     degrees(a.quantities.iter().map(|q| (q.name.as_str(), q.status, q.degree)), a.quantities.len(), id)
 }
 
-pub(super) fn generic_degrees(g: &GenericReview, id: &str) -> Block {
+pub(super) fn generic_degrees(g: &GenericReview, id: &str) -> DocumentBlock {
     let all = &g.analysis.quantities;
     degrees(all.iter().map(|q| (q.name.as_str(), q.status, q.degree)), all.len(), id)
 }
@@ -269,9 +273,9 @@ fn doubts(s: &SchemeReview) -> String {
 }
 
 /// Comparison on one page: recommendation, schemes as columns, sigmas as a picture.
-pub(super) fn comparison(blocks: &mut Vec<Block>, r: &DesignReview, answers: Vec<Block>) {
+pub(super) fn comparison(blocks: &mut Vec<DocumentBlock>, r: &DesignReview, answers: Vec<DocumentBlock>) {
     let title = format!("Comparison of {} schemes", r.schemes.len());
-    blocks.push(Block::Status(vec![Status {
+    blocks.push(DocumentBlock::Status(vec![StatusBox {
         title,
         rows: vec![recommended(r), like_with_like(r)],
         actions: vec![],
@@ -291,17 +295,17 @@ fn kept(r: &Requirements) -> String {
 }
 
 /// Schemes as columns: positions, rank, requirements, and the margin of every unknown.
-fn matrix(schemes: &[ComparedScheme]) -> Block {
+fn matrix(schemes: &[ComparedScheme]) -> DocumentBlock {
     let mut columns = vec![left("")];
     columns.extend(schemes.iter().map(|s| left(s.name.clone())));
-    let line = |name: &str, cell: &dyn Fn(&ComparedScheme) -> Cell| -> Vec<Cell> {
+    let line = |name: &str, cell: &dyn Fn(&ComparedScheme) -> TableCell| -> Vec<TableCell> {
         std::iter::once(name.into()).chain(schemes.iter().map(cell)).collect()
     };
     let mut rows = vec![
         line("positions", &|s| s.positions.len().to_string().into()),
         line("rank with dwell", &|s| {
             let grade = if s.rank[0] == s.rank[1] { Grade::Good } else { Grade::Limited };
-            Cell::graded(compare::rank(s.rank, s.has_accuracy_orders), grade)
+            TableCell::graded(compare::rank(s.rank, s.has_accuracy_orders), grade)
         }),
         line("requirements", &|s| {
             let grade = match (s.requirements.stated, s.requirements.all_met()) {
@@ -309,7 +313,7 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
                 (_, true) => Grade::Good,
                 (_, false) => Grade::Missed,
             };
-            Cell::graded(kept(&s.requirements), grade)
+            TableCell::graded(kept(&s.requirements), grade)
         }),
     ];
     let judged = schemes.iter().any(|s| s.requirements.stated > 0);
@@ -318,7 +322,7 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
             None => "no unknown".into(),
             Some(q) => {
                 let (text, grade) = margin(q);
-                Cell::graded(text, grade)
+                TableCell::graded(text, grade)
             }
         }));
     }
@@ -327,11 +331,11 @@ fn matrix(schemes: &[ComparedScheme]) -> Block {
     } else {
         "Side by side"
     };
-    Block::table(heading, columns, rows)
+    DocumentBlock::table(heading, columns, rows)
 }
 
 /// Sigma of every unknown in every scheme, with the requirement if all schemes have the same.
-fn sigmas(schemes: &[ComparedScheme]) -> Block {
+fn sigmas(schemes: &[ComparedScheme]) -> DocumentBlock {
     let all = unknowns(schemes);
     let bench = schemes.iter().any(|s| s.conditions.bench.is_some());
     let of = |s: &ComparedScheme, name: &str| s.quantities.iter().find(|q| q.name == name).cloned();
@@ -371,7 +375,7 @@ mod tests {
         let q = |requirement: Option<f64>, sigma: Option<f64>| Quantity {
             name: "D_FX".into(),
             unit: "deg/h".into(),
-            status: Exact::Observable,
+            status: Status::Observable,
             degree: Some(1),
             accuracy_order: Some(1),
             sigma,

@@ -1,6 +1,6 @@
 //! Model as part of a review.
 
-use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::degree::Status;
 use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
 use obsdeg_design::review::{ModelReview, WithoutOutput};
 use obsdeg_evidence::simulation::Outcome;
@@ -8,13 +8,13 @@ use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
 use super::answers::{self, Answers};
 use super::{ERRORS, derivatives, is_list, pictures, section};
-use crate::document::{Block, Cell, Grade, Status, StatusRow, number};
+use crate::document::{DocumentBlock, Grade, StatusBox, StatusRow, TableCell, number};
 use crate::{Answer, stated, system, words};
 
 /// Verdict on a model: its limits, and the determined unknowns.
 fn verdict(m: &ModelReview) -> String {
     let a = &m.analysis;
-    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Exact::Observable).collect();
+    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Status::Observable).collect();
     let worst = seen.iter().filter_map(|q| q.degree).max();
     let derivatives = worst.map_or_else(String::new, |k| {
         format!(", {}", derivatives(k, seen.iter().map(|q| (q.name.as_str(), q.degree))))
@@ -50,7 +50,7 @@ fn verdict(m: &ModelReview) -> String {
 
 /// Sentence on the numbers of solutions of observable unknowns.
 fn solutions(a: &SystemAnalysis) -> String {
-    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Exact::Observable).collect();
+    let seen: Vec<_> = a.quantities.iter().filter(|q| q.status == Status::Observable).collect();
     let one = |q: &&&SystemQuantity| {
         matches!(
             q.number_of_solutions,
@@ -96,7 +96,7 @@ fn by_prior(m: &ModelReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
     let estimates = m.run.iter().flat_map(|(run, _)| &run.quantities);
     // an unknown without a status is a known start, which rests on nothing else
-    let never = |e: &SystemEstimate| matches!(e.status, Some(Exact::Inseparable | Exact::NotExcited));
+    let never = |e: &SystemEstimate| matches!(e.status, Some(Status::Inseparable | Status::NotExcited));
     let unknown = estimates.filter(|e| e.status.is_some() && (never(e) || rests(e.outcome)));
     unknown.map(|e| e.name.as_str()).collect()
 }
@@ -126,9 +126,9 @@ fn limits(m: &ModelReview) -> Vec<String> {
 }
 
 /// Status of a model.
-pub(super) fn status(m: &ModelReview) -> Status {
+pub(super) fn status(m: &ModelReview) -> StatusBox {
     let a = &m.analysis;
-    let seen = a.quantities.iter().filter(|q| q.status == Exact::Observable).count();
+    let seen = a.quantities.iter().filter(|q| q.status == Status::Observable).count();
     let row = |what, (grade, text)| StatusRow { what, grade, text };
     let every = if seen == a.quantities.len() { Grade::Good } else { Grade::Limited };
     let mut rows = vec![
@@ -140,7 +140,7 @@ pub(super) fn status(m: &ModelReview) -> Status {
     if !prior.is_empty() {
         rows.push(row("Resting on the prior", (Grade::Limited, words::names(prior.iter().copied()))));
     }
-    Status { title: a.name.clone(), rows, actions: super::actions::of_model(m, &prior) }
+    StatusBox { title: a.name.clone(), rows, actions: super::actions::of_model(m, &prior) }
 }
 
 /// Answers to the questions of a board.
@@ -177,7 +177,7 @@ pub(super) fn answers(m: &ModelReview) -> Answers {
             ("Duration", duration.into()),
             ("Output to drop", output_to_drop(m).into()),
             ("Proven by", proven(m).into()),
-            ("Verified by", Cell::graded(verified, grade)),
+            ("Verified by", TableCell::graded(verified, grade)),
         ],
         next: answers::next(super::actions::of_model(m, &by_prior(m))),
     }
@@ -212,11 +212,11 @@ fn chosen(m: &ModelReview) -> String {
 }
 
 /// Limits of the verdict, and the unknowns without an answer.
-fn limits_in_brief(m: &ModelReview) -> Cell {
+fn limits_in_brief(m: &ModelReview) -> TableCell {
     let mut out = limits(m);
     let all = &m.analysis.quantities;
     let lost: Vec<&str> =
-        all.iter().filter(|q| q.status != Exact::Observable).map(|q| q.name.as_str()).collect();
+        all.iter().filter(|q| q.status != Status::Observable).map(|q| q.name.as_str()).collect();
     if !lost.is_empty() && lost != by_prior(m) {
         out.push(format!("not determined: {}", words::names(lost)));
     }
@@ -227,8 +227,8 @@ fn limits_in_brief(m: &ModelReview) -> Cell {
         out.push(format!("several solutions for {}", words::names(several)));
     }
     match out.is_empty() {
-        true => Cell::graded("Nothing found", Grade::Good),
-        false => Cell::graded(stated::capital(&out.join("; ")), Grade::Limited),
+        true => TableCell::graded("Nothing found", Grade::Good),
+        false => TableCell::graded(stated::capital(&out.join("; ")), Grade::Limited),
     }
 }
 
@@ -282,34 +282,35 @@ fn proven(m: &ModelReview) -> String {
 }
 
 /// Part with verdict, unknowns, equations and evidence.
-pub(super) fn part(blocks: &mut Vec<Block>, m: &ModelReview, level: usize, id: &str) {
+pub(super) fn part(blocks: &mut Vec<DocumentBlock>, m: &ModelReview, level: usize, id: &str) {
     let a = &m.analysis;
     let document = a.document();
     blocks.push(section(level, "Verdict"));
-    blocks.extend((!a.description.is_empty()).then(|| Block::Text(a.description.clone())));
-    blocks.push(Block::Text(verdict(m)));
+    blocks.extend((!a.description.is_empty()).then(|| DocumentBlock::Text(a.description.clone())));
+    blocks.push(DocumentBlock::Text(verdict(m)));
     blocks.push(section(level, "Unknowns and equations"));
     blocks.extend(document.blocks);
     blocks.push(pictures::model_staircase(a, &format!("{id}_staircase")));
     blocks.push(section(level, "Evidence by samples and a filter"));
-    let refused = |e| Block::Text(format!("no run or no evidence: {e}."));
+    let refused = |e| DocumentBlock::Text(format!("no run or no evidence: {e}."));
     blocks.extend(m.refused.as_ref().map(refused));
     if let Some(e) = &m.evidence {
         let document = e.document();
-        blocks.extend(document.lead.into_iter().map(Block::Text));
+        blocks.extend(document.lead.into_iter().map(DocumentBlock::Text));
         blocks.extend(document.blocks);
     }
     if let Some((run, traces)) = &m.run {
         let document = run.document();
         blocks.extend(document.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
         let flat: Vec<&str> = (run.quantities.iter())
-            .filter(|e| e.status == Some(Exact::NotExcited) && e.outcome == Outcome::PriorOnly)
+            .filter(|e| e.status == Some(Status::NotExcited) && e.outcome == Outcome::PriorOnly)
             .map(|e| e.name.as_str())
             .collect();
-        let mut errors: Vec<Block> = pictures::errors(traces, &flat, id).into_iter().map(|e| e.1).collect();
+        let mut errors: Vec<DocumentBlock> =
+            pictures::errors(traces, &flat, id).into_iter().map(|e| e.1).collect();
         let rest = errors.split_off(errors.len().min(ERRORS));
         blocks.extend(errors);
         blocks.extend(pictures::not_drawn(&flat));
-        blocks.extend(Block::details(level + 1, "Errors of all others", rest));
+        blocks.extend(DocumentBlock::details(level + 1, "Errors of all others", rest));
     }
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use obsdeg_core::model::{Carry, Source, Term, Unknowns};
+use obsdeg_core::model::{Carry, ErrorSource, Term, Unknowns};
 use obsdeg_design::review::DesignReview;
 
-use crate::document::{Block, left};
+use crate::document::{DocumentBlock, left};
 
 /// Symbols of schemes: symbol, meaning, unit, and place in the paper (J. NUDT 39(1), 2017,
 /// 1001-2486(2017)01-040-06).
@@ -119,7 +119,7 @@ fn carry(carry: Carry) -> [String; 4] {
 }
 
 /// Table of the symbols that the review may use.
-pub(super) fn notation(r: &DesignReview) -> Block {
+pub(super) fn notation(r: &DesignReview) -> DocumentBlock {
     let analyses = || r.schemes.iter().map(|s| &s.analysis).chain(r.generic.iter().map(|g| &g.analysis));
     let any_scheme = analyses().next().is_some();
     let mut rows: Vec<[String; 4]> = Vec::new();
@@ -139,7 +139,7 @@ pub(super) fn notation(r: &DesignReview) -> Block {
     };
     rows.extend(Term::ALL.into_iter().filter(used).map(|t| {
         let names = match t.source() {
-            Source::Gravity => format!("{0}X, {0}Y, {0}Z", t.family()),
+            ErrorSource::Gravity => format!("{0}X, {0}Y, {0}Z", t.family()),
             _ => format!("{0}_X, ...", t.family()),
         };
         [names, t.words().into(), t.unit().into(), equation(t).into()]
@@ -147,5 +147,5 @@ pub(super) fn notation(r: &DesignReview) -> Block {
     let columns = [left("symbol"), left("meaning"), left("unit"), left("equation")];
     let heading =
         if any_scheme { "Symbols and terms (equations: J. NUDT 39(1), 2017)" } else { "Symbols and terms" };
-    Block::table(heading, columns, rows.into_iter().map(Vec::from))
+    DocumentBlock::table(heading, columns, rows.into_iter().map(Vec::from))
 }

@@ -9,8 +9,8 @@ use obsdeg_evidence::crosscheck::{CrossCheck, SlopeCurve};
 use obsdeg_evidence::simulation::Traces;
 
 use crate::design::bound_steps;
-use crate::document::{Block, Drawing, Picture};
-use crate::figure::{BLACK, BLUE, Figure, GREEN, Line, ORANGE, Stroke, heat, style};
+use crate::document::{DocumentBlock, Drawing, Picture};
+use crate::figure::{BLACK, BLUE, Curve, Figure, GREEN, ORANGE, Stroke, heat, style};
 use crate::figures::{error_figure, file_name, history_figure, series_title, slope_figure};
 use crate::poses::{caption, panels};
 
@@ -19,21 +19,25 @@ const POINTS: usize = 160;
 /// Largest number of pictures of errors.
 const ERRORS: usize = 40;
 
-fn curves(name: &str, caption: impl Into<String>, figure: Figure) -> Block {
+fn curves(name: &str, caption: impl Into<String>, figure: Figure) -> DocumentBlock {
     let drawing = Drawing::Curves(Box::new(figure));
-    Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing })
+    DocumentBlock::Picture(Picture { name: name.into(), caption: caption.into(), drawing })
 }
 
-pub(super) fn still(name: &str, caption: impl Into<String>, svg: String) -> Block {
-    Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing: Drawing::Still(svg) })
+pub(super) fn still(name: &str, caption: impl Into<String>, svg: String) -> DocumentBlock {
+    DocumentBlock::Picture(Picture {
+        name: name.into(),
+        caption: caption.into(),
+        drawing: Drawing::Still(svg),
+    })
 }
 
-fn line(label: &str, color: &'static str, stroke: Stroke, points: Vec<(f64, f64)>) -> Line {
-    Line { label: label.into(), color, stroke, points }
+fn line(label: &str, color: &'static str, stroke: Stroke, points: Vec<(f64, f64)>) -> Curve {
+    Curve { label: label.into(), color, stroke, points }
 }
 
-fn map(name: &str, caption: impl Into<String>, svg: String) -> Block {
-    Block::Picture(Picture { name: name.into(), caption: caption.into(), drawing: Drawing::Map(svg) })
+fn map(name: &str, caption: impl Into<String>, svg: String) -> DocumentBlock {
+    DocumentBlock::Picture(Picture { name: name.into(), caption: caption.into(), drawing: Drawing::Map(svg) })
 }
 
 /// The rank over the order of derivatives, as steps.
@@ -59,7 +63,7 @@ fn stairs(profile: &[usize], unknowns: usize) -> Figure {
     }
 }
 
-pub(super) fn staircase(a: &Analysis, name: &str) -> Block {
+pub(super) fn staircase(a: &Analysis, name: &str) -> DocumentBlock {
     let mut names: Vec<Vec<&str>> = vec![Vec::new(); a.rank_profile.len()];
     for q in &a.quantities {
         if let Some(slot) = q.degree.and_then(|k| names.get_mut(k)) {
@@ -72,7 +76,7 @@ pub(super) fn staircase(a: &Analysis, name: &str) -> Block {
     curves(name, caption, stairs(&a.rank_profile, a.unknowns.len()))
 }
 
-pub(super) fn model_staircase(a: &SystemAnalysis, name: &str) -> Block {
+pub(super) fn model_staircase(a: &SystemAnalysis, name: &str) -> DocumentBlock {
     curves(name, "Rank over the order of derivatives", stairs(&a.rank_profile, a.unknowns))
 }
 
@@ -81,7 +85,7 @@ const POSES: usize = 96;
 const PANELS: usize = 12;
 
 /// Pictures of the platform at every position.
-pub(super) fn poses(poses: &[Pose], latitude_deg: f64, by_default: bool, id: &str) -> Vec<Block> {
+pub(super) fn poses(poses: &[Pose], latitude_deg: f64, by_default: bool, id: &str) -> Vec<DocumentBlock> {
     let drawn = &poses[..poses.len().min(POSES)];
     let of = |(i, some): (usize, &[Pose])| {
         let caption = match (i, some) {
@@ -90,17 +94,17 @@ pub(super) fn poses(poses: &[Pose], latitude_deg: f64, by_default: bool, id: &st
             (_, others) => format!("The same at {}", others[0].name),
         };
         let drawing = Drawing::Panels(panels(some, latitude_deg));
-        Block::Picture(Picture { name: format!("{id}_positions_{}", i + 1), caption, drawing })
+        DocumentBlock::Picture(Picture { name: format!("{id}_positions_{}", i + 1), caption, drawing })
     };
-    let mut out: Vec<Block> = drawn.chunks(PANELS).enumerate().map(of).collect();
+    let mut out: Vec<DocumentBlock> = drawn.chunks(PANELS).enumerate().map(of).collect();
     if drawn.len() < poses.len() {
-        out.push(Block::Text(format!("The first {POSES} of {} positions are drawn.", poses.len())));
+        out.push(DocumentBlock::Text(format!("The first {POSES} of {} positions are drawn.", poses.len())));
     }
     out
 }
 
 /// Gravity along the platform axes over time.
-pub(super) fn attitudes(s: &SchemeReview, name: &str) -> Block {
+pub(super) fn attitudes(s: &SchemeReview, name: &str) -> DocumentBlock {
     let axis = |k: usize| s.attitudes.iter().map(|a| (a.t_s, a.g[k])).collect();
     let figure = Figure {
         title: "Attitude: components of g".into(),
@@ -126,7 +130,7 @@ pub(super) fn attitudes(s: &SchemeReview, name: &str) -> Block {
 }
 
 /// Map of the drift that each coefficient causes at each position.
-pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name: &str) -> Block {
+pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name: &str) -> DocumentBlock {
     let rows: Vec<String> = coefficients.iter().map(|q| q.name.clone()).collect();
     let values =
         coefficients.iter().map(|q| q.excitation.iter().map(|x| x.abs().min(1.0)).collect()).collect();
@@ -140,7 +144,7 @@ pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name:
 }
 
 /// Curves of the observable unknowns in `of`, one each.
-fn sweep(s: &Sweep, of: &[String], x: impl Fn(f64) -> f64) -> Vec<Line> {
+fn sweep(s: &Sweep, of: &[String], x: impl Fn(f64) -> f64) -> Vec<Curve> {
     let columns: Vec<usize> = (0..s.names.len()).filter(|&c| of.contains(&s.names[c])).collect();
     let curve = |(i, &c): (usize, &usize)| {
         let points = s.x.iter().zip(&s.sigmas).filter_map(|(&t, row)| Some((x(t), row[c]?)));
@@ -178,7 +182,7 @@ fn predicted(s: &SchemeReview) -> &'static str {
     if s.simulation.requirements.with_bench { "total uncertainty with the bench" } else { "sigma" }
 }
 
-pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
+pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<DocumentBlock> {
     let lines = sweep(&s.latitudes, &drifts(&s.latitudes), |x| x);
     let what = predicted(s);
     let figure = Figure {
@@ -199,7 +203,7 @@ pub(super) fn latitudes(s: &SchemeReview, name: &str) -> Option<Block> {
     (!figure.lines.is_empty()).then(|| curves(name, caption, figure))
 }
 
-pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> Option<Block> {
+pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> Option<DocumentBlock> {
     let (total, what) = (review.total_s, predicted(s));
     let slews: f64 = s.positions.iter().filter_map(|p| p.slew_s).sum();
     let mut lines = sweep(&s.dwells, &drifts(&s.dwells), |factor| (total - slews) * factor + slews);
@@ -230,7 +234,7 @@ pub(super) fn dwells(s: &SchemeReview, review: &ComparedScheme, name: &str) -> O
 }
 
 /// Range of the positive values of curves with a margin; `None` without positive values.
-fn logarithmic_window(lines: &[Line]) -> Option<(f64, f64)> {
+fn logarithmic_window(lines: &[Curve]) -> Option<(f64, f64)> {
     let values = lines.iter().flat_map(|l| l.points.iter().map(|p| p.1)).filter(|y| *y > 0.0);
     let (low, high) = values.fold((f64::MAX, 0.0f64), |(l, h), y| (l.min(y), h.max(y)));
     (high > 0.0).then_some((low / 1.5, high * 1.5))
@@ -238,7 +242,7 @@ fn logarithmic_window(lines: &[Line]) -> Option<(f64, f64)> {
 
 /// Total time against the largest sigma: schemes at other dwells, and the front of the found schemes; `None`
 /// if no dwell determines the unknowns.
-pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option<Block> {
+pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option<DocumentBlock> {
     let mut lines = Vec::new();
     for (i, s) in schemes.iter().enumerate() {
         let slews: f64 = s.positions.iter().filter_map(|p| p.slew_s).sum();
@@ -282,7 +286,7 @@ pub(super) fn time_against_sigma(schemes: &[SchemeReview], name: &str) -> Option
 
 /// Errors of the estimate beside three sigma, a picture each, with the name of the unknown. Unknowns in
 /// `flat` are not drawn, since nothing affects them.
-pub(super) fn errors(traces: &Traces, flat: &[&str], id: &str) -> Vec<(String, Block)> {
+pub(super) fn errors(traces: &Traces, flat: &[&str], id: &str) -> Vec<(String, DocumentBlock)> {
     let beside = traces.linear.as_ref().map_or("", |_| ", and of the linear filter on the same measurements");
     let of = |i: usize| {
         let name = format!("{id}_error_{}_{}", i + 1, file_name(&traces.names[i]));
@@ -297,13 +301,13 @@ pub(super) fn errors(traces: &Traces, flat: &[&str], id: &str) -> Vec<(String, B
 }
 
 /// Sentence on the unknowns whose errors are not drawn; `None` without any.
-pub(super) fn not_drawn(flat: &[&str]) -> Option<Block> {
+pub(super) fn not_drawn(flat: &[&str]) -> Option<DocumentBlock> {
     let names = flat.join(", ");
     let text = format!("Not drawn, not excited and known from the prior only: {names}.");
-    (!flat.is_empty()).then_some(Block::Text(text))
+    (!flat.is_empty()).then_some(DocumentBlock::Text(text))
 }
 
-pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<Block> {
+pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<DocumentBlock> {
     let mut units: Vec<&str> = c.slopes.iter().map(|s| s.unit.as_str()).collect();
     units.sort_unstable();
     units.dedup();
@@ -317,7 +321,7 @@ pub(super) fn slopes(c: &CrossCheck, id: &str) -> Vec<Block> {
     units.iter().enumerate().map(of).collect()
 }
 
-pub(super) fn consistency(c: &CrossCheck, id: &str) -> Vec<Block> {
+pub(super) fn consistency(c: &CrossCheck, id: &str) -> Vec<DocumentBlock> {
     let outputs = c.monte_carlo.statistics.last().map_or(2, |s| s.expected as usize);
     let (n, runs) = (c.correlation.names.len(), c.monte_carlo.runs);
     let mut out = Vec::new();
@@ -338,7 +342,7 @@ pub(super) fn consistency(c: &CrossCheck, id: &str) -> Vec<Block> {
     out
 }
 
-pub(super) fn correlation(c: &CrossCheck, name: &str) -> Block {
+pub(super) fn correlation(c: &CrossCheck, name: &str) -> DocumentBlock {
     let names = &c.correlation.names;
     let svg = heat("Correlation under a diffuse prior", names, names, c.correlation.values.clone(), -1.0);
     map(

@@ -4,11 +4,11 @@ use obsdeg_core::title_block::TitleBlock;
 use obsdeg_design::review::DesignReview;
 
 use crate::Origin;
-use crate::document::{Block, Column, left};
+use crate::document::{DocumentBlock, TableColumn, left};
 
 /// Table of the title blocks, a row for each file, with room for signatures; a sentence where a single file
 /// states none.
-pub(super) fn block(r: &DesignReview, origin: &Origin) -> Block {
+pub(super) fn block(r: &DesignReview, origin: &Origin) -> DocumentBlock {
     let schemes = r.schemes.iter().map(|s| (s.name.as_str(), &s.document));
     let generic = r.generic.iter().map(|g| (g.name.as_str(), &g.document));
     let models = r.models.iter().map(|m| (m.analysis.name.as_str(), &m.document));
@@ -30,11 +30,11 @@ fn file_and_digest(line: &str) -> (&str, Option<&str>) {
 }
 
 /// Title block of one document; a sentence where the file states none.
-pub(crate) fn of_one(own: &TitleBlock, name: &str) -> Block {
+pub(crate) fn of_one(own: &TitleBlock, name: &str) -> DocumentBlock {
     of(vec![(name.to_string(), own)])
 }
 
-fn of(all: Vec<(String, &TitleBlock)>) -> Block {
+fn of(all: Vec<(String, &TitleBlock)>) -> DocumentBlock {
     let is_stated = |of: &TitleBlock| *of != TitleBlock::default();
     let entry = |of: &TitleBlock, name: &str| {
         let none = if name == "reference" && !is_stated(of) { "no document stated" } else { "-" };
@@ -45,7 +45,7 @@ fn of(all: Vec<(String, &TitleBlock)>) -> Block {
     roles.sort();
     roles.dedup();
     roles.sort_by_key(|role| all.iter().find_map(|(_, of)| of.signatures.iter().position(|s| s == *role)));
-    let columns: Vec<Column> = std::iter::once(left("document"))
+    let columns: Vec<TableColumn> = std::iter::once(left("document"))
         .chain(names.map(left))
         .chain(roles.iter().map(|role| left(format!("{role}: name, date, signature"))))
         .collect();
@@ -58,8 +58,8 @@ fn of(all: Vec<(String, &TitleBlock)>) -> Block {
             .collect()
     };
     match all.iter().any(|(_, of)| is_stated(of)) || all.len() > 1 {
-        true => Block::table("", columns, all.iter().map(row)),
-        false => Block::Text(
+        true => DocumentBlock::table("", columns, all.iter().map(row)),
+        false => DocumentBlock::Text(
             "Reference, revision, date, author and signatures are not stated (table [document] of the file)."
                 .into(),
         ),
@@ -88,15 +88,15 @@ pub(crate) fn made(version: &str, origin: &Origin) -> String {
 }
 
 /// Program, command and files of a document.
-pub(crate) fn about(version: &str, origin: &Origin) -> Vec<Block> {
-    let mut blocks = vec![Block::Text(format!("obsdeg {version}"))];
+pub(crate) fn about(version: &str, origin: &Origin) -> Vec<DocumentBlock> {
+    let mut blocks = vec![DocumentBlock::Text(format!("obsdeg {version}"))];
     blocks.extend(origin_of(origin));
     blocks
 }
 
 /// Command and files of a document, as far as they are known.
-pub(super) fn origin_of(origin: &Origin) -> Vec<Block> {
+pub(super) fn origin_of(origin: &Origin) -> Vec<DocumentBlock> {
     let command = Vec::from_iter((!origin.command.is_empty()).then(|| origin.command.clone()));
     let lists = [("Command", command), ("Files that were read", origin.inputs.clone())];
-    lists.into_iter().filter_map(|(heading, lines)| Block::list_if_any(heading, lines)).collect()
+    lists.into_iter().filter_map(|(heading, lines)| DocumentBlock::list_if_any(heading, lines)).collect()
 }

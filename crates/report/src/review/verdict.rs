@@ -1,12 +1,12 @@
 //! Verdict on a scheme in words, its limits first, and its status.
 
-use obsdeg_core::degree::Status as Exact;
+use obsdeg_core::degree::Status;
 use obsdeg_design::review::SchemeReview;
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
 use super::{derivatives, duration, joined};
-use crate::document::{Grade, Status, StatusRow, number};
+use crate::document::{Grade, StatusBox, StatusRow, number};
 use crate::{gimbals, omitted, stated, words};
 
 /// Name for the unknowns besides psi.
@@ -142,8 +142,8 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
 /// `with_dwell` are those of `coefficients` that samples determine.
 fn determined(s: &SchemeReview, coefficients: &[&Quantity], with_dwell: &[&Quantity]) -> String {
     let a = &s.analysis;
-    let of = |status: Exact| coefficients.iter().filter(move |q| q.status == status);
-    let seen: Vec<&&Quantity> = of(Exact::Observable).collect();
+    let of = |status: Status| coefficients.iter().filter(move |q| q.status == status);
+    let seen: Vec<&&Quantity> = of(Status::Observable).collect();
     let (all, what) = (coefficients.len(), kind(coefficients));
     let same = seen.iter().map(|q| &q.name).eq(with_dwell.iter().map(|q| &q.name));
     let mut first = match (seen.len(), same) {
@@ -166,9 +166,9 @@ fn determined(s: &SchemeReview, coefficients: &[&Quantity], with_dwell: &[&Quant
         format!("{} from {partners}", q.name)
     };
     let lost: Vec<String> =
-        of(Exact::Inseparable).filter(|q| q.sigma.is_none()).map(|q| partners(&q)).collect();
+        of(Status::Inseparable).filter(|q| q.sigma.is_none()).map(|q| partners(&q)).collect();
     let lost = lost.join("; ");
-    let silent = joined(of(Exact::NotExcited).map(|q| q.name.as_str()));
+    let silent = joined(of(Status::NotExcited).map(|q| q.name.as_str()));
     if !lost.is_empty() {
         first.push_str(&format!("; it cannot tell {lost}"));
     }
@@ -229,9 +229,9 @@ fn outside(review: &ComparedScheme) -> String {
 }
 
 /// Status of a scheme.
-pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
+pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> StatusBox {
     let lost = lost_with_dwell(s);
-    let every = review.quantities.iter().all(|q| q.status == Exact::Observable) && lost.is_empty();
+    let every = review.quantities.iter().all(|q| q.status == Status::Observable) && lost.is_empty();
     let grade = |good: bool| if good { Grade::Good } else { Grade::Limited };
     let (checks, agreement) = evidence(s);
     let (required, requirements) = requirements(s, review);
@@ -262,7 +262,7 @@ pub(super) fn status(s: &SchemeReview, review: &ComparedScheme) -> Status {
             if prior.is_empty() { "no estimate of the run".into() } else { words::names(prior) },
         ),
     ]);
-    Status { title: s.name.clone(), rows, actions: super::actions::of_scheme(s, review) }
+    StatusBox { title: s.name.clone(), rows, actions: super::actions::of_scheme(s, review) }
 }
 
 /// Answer to one question of a status.
@@ -278,7 +278,7 @@ fn observable(s: &SchemeReview, review: &ComparedScheme, lost: &[&str]) -> Strin
     };
     let coefficients: Vec<&Quantity> = of(false).collect();
     let what = kind(&coefficients);
-    let [by, with]: [fn(&&Quantity) -> bool; 2] = [|q| q.status == Exact::Observable, |q| q.sigma.is_some()];
+    let [by, with]: [fn(&&Quantity) -> bool; 2] = [|q| q.status == Status::Observable, |q| q.sigma.is_some()];
     let text = format!("{} {what}, {} of psi", count(false, by), count(true, by));
     let observable = if review.quantities.iter().all(|q| by(&q) == with(&q)) {
         text
