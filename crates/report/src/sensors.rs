@@ -253,6 +253,20 @@ fn unknown_row(u: &SensorUnknown) -> Vec<String> {
     vec![u.name.clone(), outputs, degree, words::degree(u.least_degree)]
 }
 
+/// Table of each candidate alone; with its cost if costs differ.
+fn each_alone(s: &Sensors, costs: bool) -> DocumentBlock {
+    let rows = s.candidates.iter().map(|c| {
+        let mut row = vec![c.name.clone()];
+        row.extend(costs.then(|| cost(c.cost)));
+        row.extend([format!("{} of {}", c.observable, s.required.len()), words::degree(c.degree)]);
+        row
+    });
+    let mut header = vec![left("candidate")];
+    header.extend(costs.then(|| right("cost")));
+    header.extend([right("observable"), right("degree")]);
+    DocumentBlock::table("Each candidate alone", header, rows)
+}
+
 impl Answer for Sensors {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
@@ -299,16 +313,7 @@ impl Answer for Sensors {
             Some(_) => "Cheapest set that makes each unknown observable, with any number of solutions",
         };
         blocks.push(DocumentBlock::table(name, header, rows));
-        let rows = self.candidates.iter().map(|c| {
-            let mut row = vec![c.name.clone()];
-            row.extend(costs.then(|| cost(c.cost)));
-            row.extend([format!("{} of {}", c.observable, self.required.len()), words::degree(c.degree)]);
-            row
-        });
-        let mut header = vec![left("candidate")];
-        header.extend(costs.then(|| right("cost")));
-        header.extend([right("observable"), right("degree")]);
-        blocks.push(DocumentBlock::table("Each candidate alone", header, rows));
+        blocks.push(each_alone(self, costs));
         blocks.push(DocumentBlock::list("Validity", validity(self)));
         let kept = match self.own_outputs.is_empty() {
             true => "in place of its outputs".to_string(),

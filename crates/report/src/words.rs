@@ -7,7 +7,9 @@ use obsdeg_core::analysis::{
 };
 use obsdeg_core::degree::{Difference, Form, Status, Verdict};
 use obsdeg_core::model::slew::Turn;
-use obsdeg_core::model::{Carry, Geometry, Scheme, ErrorSource, Term, Unknowns, omitted_unit, parse_attitude};
+use obsdeg_core::model::{
+    Carry, ErrorSource, Geometry, Scheme, Term, Unknowns, omitted_unit, parse_attitude,
+};
 use obsdeg_core::solution::{Frame, Verification};
 use obsdeg_evidence::simulation::{
     AccelerometerBias, CoefficientFloor, Consistency, Doubt, GyroNoise, NoiseFloor, Outcome, Reached,

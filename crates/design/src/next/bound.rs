@@ -17,7 +17,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Quaternion, UnitQuaternion, Vector3};
-use obsdeg_core::model::{AZIMUTH, Float, Platform, Source};
+use obsdeg_core::model::{AZIMUTH, ErrorSource, Float, Platform};
 use obsdeg_evidence::requirements::Worst;
 use obsdeg_evidence::simulation::{Attained, Conditions, KnownCovariance, Plan, si_per_shown};
 
@@ -245,7 +245,7 @@ pub(super) fn bound(
     let (names, units) = (platform.names(), platform.units());
     let first = names.len() - platform.coefficients();
     let terms = platform.error_terms();
-    let steady = |&k: &usize| terms[k].source == Source::Gravity && terms[k].factors.len() <= 1;
+    let steady = |&k: &usize| terms[k].source == ErrorSource::Gravity && terms[k].factors.len() <= 1;
     let drift: Vec<usize> = (0..terms.len()).filter(steady).collect();
     if !drift.iter().all(|&k| known.sigma(&names[first + k]).is_some()) {
         return None;

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use obsdeg_core::model::slew::Slew;
 use obsdeg_core::model::{Dwell, Platform, Position, Scheme, SlewTo, angles_text, c_n_f64};
-use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements, Worst};
+use obsdeg_evidence::requirements::{Basis, RequirementClaim, Miss, Requirements, Worst};
 use obsdeg_evidence::simulation::{Attained, Conditions, KnownCovariance, SimulationError, is_rate, resolve};
 
 use super::answer::{AddedPosition, AttitudeBound, Meeting, Quickest, Standing};
@@ -250,7 +250,7 @@ impl Compared<'_> {
         let (names, units) = (platform.names(), platform.units());
         let limits = resolve("required sigma", &platform, &self.conditions.requirements, f64::NAN)?;
         let coefficients = names.len() - platform.coefficients()..names.len();
-        let claims = coefficients.map(|c| Claim {
+        let claims = coefficients.map(|c| RequirementClaim {
             name: &names[c],
             required: Some(limits[c]).filter(|r| !r.is_nan()),
             sigma: known.sigma(&names[c]).ok_or(Miss::NotObservable),

@@ -26,7 +26,7 @@ mod rotations;
 mod steps;
 
 use obsdeg_core::model::Scheme;
-use obsdeg_evidence::acceptance::{Measured, acceptance};
+use obsdeg_evidence::acceptance::{MeasuredCoefficient, acceptance};
 use obsdeg_evidence::simulation::{Conditions, MeasurementReport, Plan};
 
 pub use answer::*;
@@ -53,7 +53,7 @@ pub fn procedure(
     let tolerance = readings::add(&mut steps, &plan, conditions, options)?;
     let progress = progress(scheme, conditions, options.seed)?;
     let timed_turns = steps.iter().all(|s| s.turn.as_ref().is_none_or(|t| t.rate_deg_s.is_some()));
-    let measured = progress.coefficients.iter().map(|c| Measured {
+    let measured = progress.coefficients.iter().map(|c| MeasuredCoefficient {
         name: &c.name,
         unit: &c.unit,
         estimate: None,

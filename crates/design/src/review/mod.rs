@@ -203,13 +203,13 @@ const UP: usize = 1;
 
 fn positions(scheme: &Scheme, conditions: &Conditions, plan: &Plan) -> Vec<PositionReview> {
     let slew = |i: usize| {
-        let of = |p: &&obsdeg_evidence::simulation::Segment| {
+        let of = |p: &&obsdeg_evidence::simulation::PlanSegment| {
             p.position == i && matches!(p.kind, SegmentKind::Slew(_))
         };
         plan.segments.iter().find(of).map(|s| s.dt * s.steps as f64)
     };
     let start = |i: usize| {
-        let of = |p: &&obsdeg_evidence::simulation::Segment| {
+        let of = |p: &&obsdeg_evidence::simulation::PlanSegment| {
             p.position == i && !matches!(p.kind, SegmentKind::Slew(_))
         };
         plan.segments.iter().find(of).map_or(0.0, |s| s.start_s)

@@ -113,6 +113,29 @@ mod tests {
     use obsdeg_evidence::simulation::Conditions;
     use obsdeg_exact::SplitMix64;
 
+    /// Random scheme, with the number of its coefficients.
+    fn drawn_scheme(drawn: &mut dyn FnMut(u64) -> usize) -> (Scheme, usize) {
+        let terms = ["F", "F,I", "F,O,S", "F,I,O,S", "F,K0"][drawn(5)];
+        let base = Scheme {
+            carry: Carry::Reset,
+            latitude: (5 + drawn(80)).to_string().parse().ok(),
+            unknowns: terms.parse().expect("terms"),
+            ..Scheme::default()
+        };
+        (base, 3 * terms.split(',').count())
+    }
+
+    /// Random candidates: cardinal in every second task, else near each other or not.
+    fn drawn_candidates(task: usize, drawn: &mut dyn FnMut(u64) -> usize) -> Vec<Euler> {
+        let near = [1, 30, 360][drawn(3)];
+        (0..4 + drawn(8))
+            .map(|_| match task % 2 {
+                0 => Candidates::cardinals().attitudes[drawn(24)].clone(),
+                _ => std::array::from_fn(|_| Angle::from_degrees(drawn(near) as i32)),
+            })
+            .collect()
+    }
+
     /// Random schemes: the criterion in 512 bits, of the same information, is never above the bound,
     /// and hardly below it. The criterion in double precision is often below the one in 512 bits, so
     /// rounding must be allowed for. Some schemes have coefficients that do not count, some are near
@@ -123,26 +146,13 @@ mod tests {
         let (mut told, mut below, mut parts) = (0, 0, Vec::new());
         for task in 0..300 {
             let mut drawn = |n: u64| rng.below(n) as usize;
-            let terms = ["F", "F,I", "F,O,S", "F,I,O,S", "F,K0"][drawn(5)];
-            let d = 3 * terms.split(',').count();
-            let base = Scheme {
-                carry: Carry::Reset,
-                latitude: (5 + drawn(80)).to_string().parse().ok(),
-                unknowns: terms.parse().expect("terms"),
-                ..Scheme::default()
-            };
+            let (base, d) = drawn_scheme(&mut drawn);
             let conditions = Conditions {
                 dwell_s: [50.0, 1000.0, 4000.0][drawn(3)],
                 step_s: 50.0,
                 ..Conditions::default()
             };
-            let near = [1, 30, 360][drawn(3)];
-            let candidates: Vec<Euler> = (0..4 + drawn(8))
-                .map(|_| match task % 2 {
-                    0 => Candidates::cardinals().attitudes[drawn(24)].clone(),
-                    _ => std::array::from_fn(|_| Angle::from_degrees(drawn(near) as i32)),
-                })
-                .collect();
+            let candidates = drawn_candidates(task, &mut drawn);
             let mut counting: Vec<usize> = (0..d).filter(|_| drawn(3) > 0).collect();
             if counting.is_empty() {
                 counting.push(0);

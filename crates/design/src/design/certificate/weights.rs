@@ -607,6 +607,19 @@ mod tests {
         }
     }
 
+    /// Gradient and Hessian with s as one more variable.
+    fn whole(slopes: BarrierSlopes) -> (Vec<f64>, DMatrix<f64>) {
+        let n = slopes.gradient.len();
+        let (mut gradient, mut h) = (slopes.gradient, slopes.hessian);
+        if let Some(by) = slopes.by_s {
+            gradient.push(by.gradient);
+            h = h.insert_row(n, 0.0).insert_column(n, 0.0);
+            let m = DVector::from_fn(n + 1, |i, _| if i < n { by.follows[i] } else { -1.0 });
+            h += &m * m.transpose() * by.curvature;
+        }
+        (gradient, h)
+    }
+
     /// Gradients and Hessians equal differences of the barrier function.
     #[test]
     fn slopes_are_differences() {
@@ -628,18 +641,6 @@ mod tests {
             let s = if aim == Objective::Least { 0.5 / scale } else { 2.0 * scale };
             let (tau, unit) = (7.0, 1.3);
             let root = weighing.at(&w, s, tau, unit).expect("inside").root;
-            // with s as a sixth variable
-            let whole = |slopes: BarrierSlopes| {
-                let n = slopes.gradient.len();
-                let (mut gradient, mut h) = (slopes.gradient, slopes.hessian);
-                if let Some(by) = slopes.by_s {
-                    gradient.push(by.gradient);
-                    h = h.insert_row(n, 0.0).insert_column(n, 0.0);
-                    let m = DVector::from_fn(n + 1, |i, _| if i < n { by.follows[i] } else { -1.0 });
-                    h += &m * m.transpose() * by.curvature;
-                }
-                (gradient, h)
-            };
             let (gradient, hessian) = whole(weighing.slopes(&root, &w, tau, unit).expect("inside"));
             let moved = |k: usize, h: f64| {
                 let (mut w, mut s) = (w, s);

@@ -46,7 +46,7 @@ impl Evaluator {
         };
         let latitude = scheme
             .latitude
-            .map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
+            .map_or((1.0, 0.0), |l| obsdeg_exact::TurnFraction::from_nanodeg(l.nanodeg()).cos_sin_f64());
         if conditions.slew_rate_deg_s.is_some() && scheme.carry != Carry::Inertial {
             return Err(SimulationError::SlewCarry { carry: scheme.carry }.into());
         }

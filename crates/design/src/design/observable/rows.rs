@@ -9,8 +9,8 @@
 use std::collections::HashMap;
 
 use obsdeg_core::degree::{EnsembleError, local_chain};
-use obsdeg_core::model::{Carry, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme, Source};
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_core::model::{Carry, ErrorSource, Euler, Gimbals, Matrix3, Platform, RandomValues, Scheme};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::parallel;
 use obsdeg_exact::{Echelon, Field};
 
@@ -107,11 +107,11 @@ impl AttitudeRows {
             // under reset carry
             let psi = if reset { 3 * candidates.len() } else { 3 };
             let orders = here.by_order.len();
-            let claim = Claim {
+            let claim = RankClaim {
                 unknowns: platform.coefficients() + psi,
                 decisions: 1,
                 order: values.roots().order,
-                row_degree: orders + usize::from(base.unknowns.have(Source::Rate)),
+                row_degree: orders + usize::from(base.unknowns.have(ErrorSource::Rate)),
                 // an entry is at most 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of
                 // norm at most sqrt(15) together, with margin
                 row_bits: 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0,

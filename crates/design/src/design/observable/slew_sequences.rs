@@ -14,10 +14,10 @@ use obsdeg_core::degree::{EnsembleError, local_chain};
 use obsdeg_core::model::settings::concerns;
 use obsdeg_core::model::slew::{rotation_vector, times, transpose};
 use obsdeg_core::model::{
-    Carry, Euler, Gimbals, LOCAL, Matrix3, Path, Platform, RandomValues, Scheme, Source, c_n_f64,
+    Carry, ErrorSource, Euler, Gimbals, LOCAL, Matrix3, Path, Platform, RandomValues, Scheme, c_n_f64,
     parse_attitude,
 };
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::parallel;
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 use schemars::JsonSchema;
@@ -234,8 +234,8 @@ impl SlewSequenceSearch {
     }
 
     /// Decision that no sequence of `length` positions is sufficient, for the bound on errors.
-    fn claim(&self, length: usize) -> Claim {
-        Claim {
+    fn claim(&self, length: usize) -> RankClaim {
+        RankClaim {
             unknowns: 3 + self.fields[0].coefficients,
             decisions: self.required.len(),
             order: self.order,
@@ -512,5 +512,5 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
 /// True if torquer errors act in the turns of `base`: then [`walks`] finds schemes, and no search over
 /// sets does.
 pub fn is_walk(base: &Scheme) -> bool {
-    base.carry == Carry::Inertial && base.unknowns.have(Source::Rate)
+    base.carry == Carry::Inertial && base.unknowns.have(ErrorSource::Rate)
 }

@@ -60,7 +60,7 @@ const POWERS: usize = 4;
 pub(crate) struct Screen<'a> {
     evaluator: &'a Evaluator,
     criterion: &'a Criterion,
-    positions: CandidateInformation,
+    positions: AttitudeInformation,
     /// Mean information of two positions (n x n, lower triangle).
     mean: Vec<f64>,
     magnitudes: MagnitudeBounds,
@@ -80,7 +80,7 @@ struct MagnitudeBounds {
 
 /// Information of every candidate as a scheme of its own, on psi at its start, as it is carried, and on
 /// the coefficients. Each vector holds one entry of all candidates.
-struct CandidateInformation {
+struct AttitudeInformation {
     /// Information on psi: xx, 2 xy, yy, 2 xz, 2 yz, zz.
     psi: [Vec<f64>; 6],
     /// Twice the information between psi and every coefficient (3 x d).
@@ -148,7 +148,7 @@ impl<'a> Screen<'a> {
         }
         mean.iter_mut().for_each(|x| *x /= (count * count) as f64);
         let magnitudes = MagnitudeBounds::of(&bare, &alone);
-        Some(Self { evaluator, criterion, positions: CandidateInformation::of(&alone, n), mean, magnitudes })
+        Some(Self { evaluator, criterion, positions: AttitudeInformation::of(&alone, n), mean, magnitudes })
     }
 
     pub(crate) fn scratch(&self) -> Scratch {
@@ -417,7 +417,7 @@ impl MagnitudeBounds {
     }
 }
 
-impl CandidateInformation {
+impl AttitudeInformation {
     fn of(alone: &[SequenceState], n: usize) -> Self {
         let entry = |i: usize, j: usize| -> Vec<f64> {
             let factor = if i == j { 1.0 } else { 2.0 };
@@ -441,7 +441,7 @@ fn add(sum: &mut [f64], factor: f64, entries: &[f64]) {
 }
 
 impl VectorEnergy {
-    fn take(&mut self, positions: &CandidateInformation, x: &[f64; MAX_UNKNOWNS]) {
+    fn take(&mut self, positions: &AttitudeInformation, x: &[f64; MAX_UNKNOWNS]) {
         let all = self.linear.iter_mut().chain(&mut self.shift).chain(std::iter::once(&mut self.constant));
         all.for_each(|entries| entries.fill(0.0));
         let d = positions.cross[0].len();
@@ -459,7 +459,7 @@ impl VectorEnergy {
     }
 
     /// Contribution of candidate `c` if psi is z.
-    fn at(&self, c: usize, positions: &CandidateInformation, z: &[f64; 3]) -> f64 {
+    fn at(&self, c: usize, positions: &AttitudeInformation, z: &[f64; 3]) -> f64 {
         let [x, y, w] = *z;
         let products = [x * x, x * y, y * y, x * w, y * w, w * w];
         let square: f64 = positions.psi.iter().zip(products).map(|(entries, p)| entries[c] * p).sum();
@@ -468,14 +468,14 @@ impl VectorEnergy {
     }
 
     /// Psi after a dwell at candidate `c`.
-    fn behind(&self, c: usize, positions: &CandidateInformation, z: &[f64; 3]) -> [f64; 3] {
+    fn behind(&self, c: usize, positions: &AttitudeInformation, z: &[f64; 3]) -> [f64; 3] {
         let turned =
             |r: usize| positions.turned[r].iter().zip(z).map(|(entries, z)| entries[c] * z).sum::<f64>();
         std::array::from_fn(|r| self.shift[r][c] + turned(r))
     }
 
     /// Adds `before` and the contribution of every candidate, if psi is z, to `energy`.
-    fn all(&self, positions: &CandidateInformation, z: &[f64; 3], before: f64, energy: &mut [f64]) {
+    fn all(&self, positions: &AttitudeInformation, z: &[f64; 3], before: f64, energy: &mut [f64]) {
         let n = energy.len();
         let [x, y, w] = *z;
         let [lx, ly, lw] = self.linear.each_ref().map(|entries| &entries[..n]);
@@ -523,6 +523,47 @@ mod tests {
     use obsdeg_core::model::{Angle, Carry, Euler, Scheme};
     use obsdeg_evidence::simulation::Conditions;
 
+    /// Random scheme, with the number of its coefficients.
+    fn drawn_scheme(below: &mut dyn FnMut(u64) -> usize) -> (Scheme, usize) {
+        let carry = [Carry::Platform, Carry::Inertial][below(2)];
+        let terms = ["F", "F,I", "O,S", "F,I,O,S", "F,O,K0", "F,I,K1,M3"][below(6)];
+        let base = Scheme {
+            carry,
+            latitude: (10 + below(70)).to_string().parse().ok(),
+            unknowns: terms.parse().expect("terms"),
+            ..Scheme::default()
+        };
+        (base, 3 * terms.split(',').count())
+    }
+
+    /// Random conditions; every third task has priors.
+    fn drawn_conditions(task: usize, below: &mut dyn FnMut(u64) -> usize) -> Conditions {
+        let mut conditions = Conditions {
+            dwell_s: [50.0, 1000.0, 4000.0][below(3)],
+            step_s: 50.0,
+            accelerometer_noise_g: [1e-7, 1e-5, 1e-3][below(3)],
+            ..Conditions::default()
+        };
+        if task % 3 == 0 {
+            let known = [("D", [0.01, 1.0][below(2)]), ("psi", 1e-3), ("psi_y", 1e-5)];
+            let stated = known.map(|(name, value)| Assignment { name: name.into(), value });
+            conditions.priors.extend(stated.into_iter().take(1 + below(3)));
+        }
+        conditions
+    }
+
+    /// Random candidates, cardinal or not.
+    fn drawn_candidates(below: &mut dyn FnMut(u64) -> usize) -> Vec<Euler> {
+        let cardinals = Candidates::cardinals().attitudes;
+        let cardinal = below(2) == 0;
+        (0..3 + below(5))
+            .map(|_| match cardinal {
+                true => cardinals[below(24)].clone(),
+                false => std::array::from_fn(|_| Angle::from_degrees(below(360) as i32 - 180)),
+            })
+            .collect()
+    }
+
     /// For any limit no pair is excluded whose criterion is within it, and nearly all worse ones are:
     /// both carries, every criterion, and random terms, candidates, dwells and coefficients that count.
     #[test]
@@ -531,34 +572,9 @@ mod tests {
         let (mut worse, mut excluded, mut within) = (0, 0, 0);
         for task in 0..400 {
             let mut below = |n: u64| rng.below(n) as usize;
-            let carry = [Carry::Platform, Carry::Inertial][below(2)];
-            let terms = ["F", "F,I", "O,S", "F,I,O,S", "F,O,K0", "F,I,K1,M3"][below(6)];
-            let base = Scheme {
-                carry,
-                latitude: (10 + below(70)).to_string().parse().ok(),
-                unknowns: terms.parse().expect("terms"),
-                ..Scheme::default()
-            };
-            let d = 3 * terms.split(',').count();
-            let mut conditions = Conditions {
-                dwell_s: [50.0, 1000.0, 4000.0][below(3)],
-                step_s: 50.0,
-                accelerometer_noise_g: [1e-7, 1e-5, 1e-3][below(3)],
-                ..Conditions::default()
-            };
-            if task % 3 == 0 {
-                let known = [("D", [0.01, 1.0][below(2)]), ("psi", 1e-3), ("psi_y", 1e-5)];
-                let stated = known.map(|(name, value)| Assignment { name: name.into(), value });
-                conditions.priors.extend(stated.into_iter().take(1 + below(3)));
-            }
-            let cardinals = Candidates::cardinals().attitudes;
-            let cardinal = below(2) == 0;
-            let candidates: Vec<Euler> = (0..3 + below(5))
-                .map(|_| match cardinal {
-                    true => cardinals[below(24)].clone(),
-                    false => std::array::from_fn(|_| Angle::from_degrees(below(360) as i32 - 180)),
-                })
-                .collect();
+            let (base, d) = drawn_scheme(&mut below);
+            let conditions = drawn_conditions(task, &mut below);
+            let candidates = drawn_candidates(&mut below);
             let mut counting: Vec<usize> = (0..d).filter(|_| below(4) > 0).collect();
             if counting.is_empty() {
                 counting.push(0);
@@ -590,7 +606,7 @@ mod tests {
             let mut alive = vec![true; values.len()];
             screen.pairs(&state, limit, &mut alive, &mut screen.scratch());
             for (value, alive) in values.iter().zip(alive) {
-                assert!(alive || *value > limit, "task {task} {carry} {criterion:?}: {value} {limit}");
+                assert!(alive || *value > limit, "task {task} {base:?} {criterion:?}: {value} {limit}");
                 within += usize::from(*value <= limit);
                 worse += usize::from(*value > limit * 1.5);
                 excluded += usize::from(*value > limit * 1.5 && !alive);
