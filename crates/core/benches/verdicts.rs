@@ -8,7 +8,7 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::degree::{PlatformRows, climb};
-use obsdeg_core::model::{Carry, Path, Platform, RandomValues, Sample, Scheme, parse_attitude};
+use obsdeg_core::model::{Carry, FieldSample, Path, Platform, RandomValues, Scheme, parse_attitude};
 use obsdeg_exact::{Echelon, SplitMix64};
 
 fn main() {
@@ -30,7 +30,7 @@ fn of_terms(carry: Carry, terms: &str) -> Platform {
     }
 }
 
-fn samples(platform: &Platform) -> Vec<Sample> {
+fn samples(platform: &Platform) -> Vec<FieldSample> {
     let mut rng = SplitMix64::new(1);
     (0..2)
         .filter_map(|_| RandomValues::draw(platform.scheme(), &mut rng).ok())

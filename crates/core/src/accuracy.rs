@@ -8,14 +8,14 @@
 //! = 1 the module is graded and the order equals the degree. The same holds under reset carry, where psi
 //! ends with each position.
 
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::series::{SeriesEchelon, SeriesRing};
 use obsdeg_exact::{Echelon, SplitMix64, gcd};
 
 use crate::degree::ensemble::Verdicts;
 use crate::degree::platform_rows::{LocalRow, local_chain};
 use crate::degree::transition::{LiftField, RandomTime, transition};
-use crate::model::platform::{Block, LOCAL, Platform, Sample};
+use crate::model::platform::{FieldSample, LOCAL, Platform, PositionBlock};
 use crate::model::ring::Ring;
 use crate::model::{Carry, Dwell, Scheme, Unknowns};
 
@@ -157,7 +157,7 @@ pub(crate) fn dwell_ratios(scheme: &Scheme) -> Vec<u64> {
 /// The module L at one sample, with enough precision for every order.
 fn module(
     platform: &Platform,
-    sample: &Sample,
+    sample: &FieldSample,
     dwells: &[u64],
     rng: &mut SplitMix64,
 ) -> Result<Module, AccuracyError> {
@@ -177,9 +177,9 @@ fn module(
     for precision in PRECISIONS {
         let ring = SeriesRing { field, precision };
         let lift = |x: &u64| ring.monomial(*x, 0);
-        let blocks: Vec<Block<Vec<u64>>> = blocks
+        let blocks: Vec<PositionBlock<Vec<u64>>> = blocks
             .iter()
-            .map(|b| Block {
+            .map(|b| PositionBlock {
                 columns: b.columns.clone(),
                 rows: b.rows.each_ref().map(|r| r.iter().map(lift).collect()),
             })
@@ -203,7 +203,7 @@ pub(crate) type Row<R> = Vec<<R as Ring>::Element>;
 /// are constant.
 pub(crate) fn dwell_rows<R: LiftField>(
     ring: &R,
-    blocks: &[Block<R::Element>],
+    blocks: &[PositionBlock<R::Element>],
     chain: &[LocalRow],
     power: impl Fn(usize) -> R::Element,
     phi: impl Fn(usize) -> [[R::Element; LOCAL]; 3],
@@ -248,10 +248,10 @@ pub(crate) fn dwell_rows<R: LiftField>(
 
 /// Size of the claim: rows as in the verdicts, times the transition matrices. These have degree N in the
 /// rates as series, and twice the sum of the ratios in the point of the circle.
-fn claim(platform: &Platform, verdicts: &Verdicts, dwells: &[u64]) -> Claim {
+fn claim(platform: &Platform, verdicts: &Verdicts, dwells: &[u64]) -> RankClaim {
     let turns = usize::try_from(dwells.iter().sum::<u64>()).unwrap_or(usize::MAX / 8);
     let unknowns = platform.names().len();
-    Claim {
+    RankClaim {
         unknowns,
         decisions: 2 * (1 + 2 * unknowns),
         order: verdicts.values[0].roots().order,

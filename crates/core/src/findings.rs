@@ -29,7 +29,7 @@ pub enum AnalysisError {
 }
 
 /// Judged scheme, from which everything else is computed.
-pub struct Judged<'a> {
+pub struct JudgedScheme<'a> {
     /// Platform of the scheme.
     pub platform: &'a Platform,
     /// Verdicts, with the random values and bases behind them.
@@ -77,7 +77,7 @@ pub struct Orders {
     pub end: Option<usize>,
 }
 
-impl<'a> Judged<'a> {
+impl<'a> JudgedScheme<'a> {
     /// Judges a scheme, and reads its requested combinations.
     ///
     /// # Errors

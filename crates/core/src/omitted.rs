@@ -12,7 +12,7 @@
 //!
 //! Two random fields must agree.
 
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::{Echelon, Field, SplitMix64, radical};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ use crate::degree::coefficient::{
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::platform_rows::{LocalRow, chain_of};
 use crate::degree::transition::RandomTime;
-use crate::model::platform::{Block, LOCAL, Platform, RandomValues, Sample, local_output};
+use crate::model::platform::{FieldSample, LOCAL, Platform, PositionBlock, RandomValues, local_output};
 use crate::model::{Carry, Observed, OmittedModel, Scheme};
 
 /// Number of pairs of fields drawn before a disagreement is an error.
@@ -188,7 +188,7 @@ fn verdicts(
     });
     let unknowns = names.len() + model.terms().len();
     let dwells = usize::try_from(dwell_ratios(platform.scheme()).iter().sum::<u64>());
-    let claim = Claim {
+    let claim = RankClaim {
         unknowns,
         decisions: unknowns * (1 + model.terms().len()),
         order,
@@ -204,7 +204,12 @@ fn verdicts(
 }
 
 /// Classes and changes at one sample.
-fn classes(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut SplitMix64) -> FoundClasses {
+fn classes(
+    platform: &Platform,
+    model: &OmittedModel,
+    sample: &FieldSample,
+    rng: &mut SplitMix64,
+) -> FoundClasses {
     let (n, m) = (platform.names().len(), model.terms().len());
     let field = sample.point.ring;
     let mut space = Echelon::new(field, n + m);
@@ -236,7 +241,12 @@ fn quotient(field: &Field, a: u64, b: u64) -> u64 {
 }
 
 /// All rows of `[J O]` at one sample.
-fn rows(platform: &Platform, model: &OmittedModel, sample: &Sample, rng: &mut SplitMix64) -> Vec<Vec<u64>> {
+fn rows(
+    platform: &Platform,
+    model: &OmittedModel,
+    sample: &FieldSample,
+    rng: &mut SplitMix64,
+) -> Vec<Vec<u64>> {
     let point = &sample.point;
     let field = point.ring;
     let blocks = model.blocks(platform, point);
@@ -260,11 +270,11 @@ fn reset_rows(
     platform: &Platform,
     model: &OmittedModel,
     field: &Field,
-    blocks: &[Block<u64>],
+    blocks: &[PositionBlock<u64>],
     chain: &[LocalRow],
 ) -> Vec<Vec<u64>> {
     let columns = platform.names().len() + model.terms().len();
-    let row_of = |block: &Block<u64>, local: &LocalRow| {
+    let row_of = |block: &PositionBlock<u64>, local: &LocalRow| {
         let mut row = vec![0; columns];
         for (k, &column) in block.columns.iter().enumerate() {
             row[column] = block.entry(field, &local.row, k);

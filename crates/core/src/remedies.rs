@@ -139,16 +139,16 @@ impl<S: Scalars> Directions<S> {
     }
 
     /// Information of known values of some unknowns on the unobservable directions.
-    pub(crate) fn known(&self, columns: &[usize]) -> Information<S> {
+    pub(crate) fn known(&self, columns: &[usize]) -> CandidateInformation<S> {
         let mut space = <S::Space as RowSpace>::new(self.field.clone(), self.count);
         for &c in columns {
             space.insert(&self.units[c]);
         }
-        Information { space, given: columns.to_vec() }
+        CandidateInformation { space, given: columns.to_vec() }
     }
 
     /// Information of further rows on the unobservable directions.
-    pub(crate) fn rows<'a>(&self, rows: impl Iterator<Item = &'a [S::Element]>) -> Information<S>
+    pub(crate) fn rows<'a>(&self, rows: impl Iterator<Item = &'a [S::Element]>) -> CandidateInformation<S>
     where
         S::Element: 'a,
     {
@@ -163,7 +163,7 @@ impl<S: Scalars> Directions<S> {
     }
 
     /// Unknowns of `open` that become observable by this information and are not given.
-    pub(crate) fn resolved(&self, by: &Information<S>, open: &[usize]) -> Vec<usize> {
+    pub(crate) fn resolved(&self, by: &CandidateInformation<S>, open: &[usize]) -> Vec<usize> {
         let resolved = |c: &usize| !by.given.contains(c) && by.space.contains(&self.units[*c]);
         open.iter().copied().filter(resolved).collect()
     }
@@ -217,8 +217,8 @@ impl<S: Scalars> Directions<S> {
     /// left out: more than `MOST_PAIRED` in a list, or the end of the work.
     pub(crate) fn pairs(
         &self,
-        left: &[Information<S>],
-        right: Option<&[Information<S>]>,
+        left: &[CandidateInformation<S>],
+        right: Option<&[CandidateInformation<S>]>,
         open: Vec<usize>,
         mut judge: impl FnMut(usize, usize) -> Option<Vec<usize>>,
     ) -> bool {
@@ -249,14 +249,14 @@ impl<S: Scalars> Directions<S> {
 }
 
 /// Information of a candidate on the unobservable directions.
-pub(crate) struct Information<S: Scalars> {
+pub(crate) struct CandidateInformation<S: Scalars> {
     /// Span of the candidate's rows, in entries of the directions.
     space: S::Space,
     /// Unknowns whose values the candidate gives.
     given: Vec<usize>,
 }
 
-impl<S: Scalars> Information<S> {
+impl<S: Scalars> CandidateInformation<S> {
     /// Information of two candidates together.
     fn and(&self, other: &Self) -> Self {
         let mut space = self.space.clone();

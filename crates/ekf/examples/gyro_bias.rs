@@ -5,7 +5,9 @@
 use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3, dvector};
-use obsdeg_ekf::{EkfError, Filter, Form, Manifold, Measurement, Motion, ProcessNoise, Transition, Update};
+use obsdeg_ekf::{
+    CovarianceForm, EkfError, Filter, Manifold, Measurement, Motion, ProcessNoise, Transition, Update,
+};
 
 /// Attitude (body to inertial axes) and bias of the gyros in rad/s.
 #[derive(Clone)]
@@ -39,9 +41,9 @@ impl Manifold for Body {
 }
 
 /// One reading of the gyros in rad/s.
-struct Reading(Vector3<f64>);
+struct GyroReading(Vector3<f64>);
 
-impl Motion<Body> for Reading {
+impl Motion<Body> for GyroReading {
     fn advance(
         &self,
         _: f64,
@@ -86,12 +88,12 @@ fn main() -> Result<(), EkfError> {
     let mut truth = UnitQuaternion::from_euler_angles(0.5, -0.2, 1.0);
     let start = Body { attitude: UnitQuaternion::from_euler_angles(0.4, 0.0, 1.1), bias: Vector3::zeros() };
     let p0 = DMatrix::from_diagonal(&dvector![0.1, 0.1, 0.1, 1e-6, 1e-6, 1e-6]);
-    let mut filter = Filter::new(start, &p0, Form::Ud)?;
+    let mut filter = Filter::new(start, &p0, CovarianceForm::Ud)?;
     for k in 0..600 {
         let t = 0.1 * f64::from(k);
         let rate = Vector3::new(0.02, 0.03 * (0.2 * t).sin(), -0.01);
         truth *= UnitQuaternion::from_scaled_axis(rate * 0.1);
-        filter.advance(&Reading(rate + bias), t, 0.1)?;
+        filter.advance(&GyroReading(rate + bias), t, 0.1)?;
         // the second star is behind a cloud for a while
         let seen = Stars.h(t, &Body { attitude: truth, bias });
         let z: Vec<Option<f64>> = (0..6).map(|i| Some(seen[i]).filter(|_| i < 3 || k > 300)).collect();

@@ -4,12 +4,12 @@
 
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 use obsdeg_ekf::integrate::van_loan;
-use obsdeg_ekf::{EkfError, Filter, Form, Interval, Measurement, ProcessNoise, Transition};
+use obsdeg_ekf::{CovarianceForm, EkfError, Filter, FixedInterval, Measurement, ProcessNoise, Transition};
 
 /// Measurement of the position of x = (position, velocity).
-struct Position;
+struct PositionMeasurement;
 
-impl Measurement for Position {
+impl Measurement for PositionMeasurement {
     fn outputs(&self) -> usize {
         1
     }
@@ -27,14 +27,14 @@ impl Measurement for Position {
 fn main() -> Result<(), EkfError> {
     let (phi, q) = van_loan(&dmatrix![0.0, 1.0; 0.0, 0.0], &dmatrix![0.0, 0.0; 0.0, 1e-4], 1.0)?;
     let (step, noise) = (Transition::new(&phi)?, ProcessNoise::new(&q)?);
-    let mut filter = Filter::new(dvector![0.0, 0.0], &dmatrix![1.0, 0.0; 0.0, 1.0], Form::Joseph)?;
-    let mut interval = Interval::new(&filter);
+    let mut filter = Filter::new(dvector![0.0, 0.0], &dmatrix![1.0, 0.0; 0.0, 1.0], CovarianceForm::Joseph)?;
+    let mut interval = FixedInterval::new(&filter);
     let mut at_the_time = vec![1.0];
     for t in 1..=40 {
         filter.jump(&phi * filter.x(), &step, &noise)?;
         interval.predicted(&filter, step.clone());
         if !(15..=25).contains(&t) {
-            filter.update(&Position, f64::from(t), &dvector![0.2 * f64::from(t)])?;
+            filter.update(&PositionMeasurement, f64::from(t), &dvector![0.2 * f64::from(t)])?;
             interval.updated(&filter);
         }
         at_the_time.push(filter.covariance().sigmas()[0]);

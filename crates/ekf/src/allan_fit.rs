@@ -181,7 +181,7 @@ struct FitProblem<'a> {
 }
 
 /// Squared coefficients and their covariance (zero for noises that were left out).
-struct Solution {
+struct AllanSolution {
     x: [f64; TERMS],
     covariance: DMatrix<f64>,
     left: f64,
@@ -198,7 +198,7 @@ impl FitProblem<'_> {
     }
 
     /// Least squares for the noises `kept` with weights by squared coefficients `by`.
-    fn solve(&self, kept: &[usize], by: &[f64; TERMS]) -> Option<Solution> {
+    fn solve(&self, kept: &[usize], by: &[f64; TERMS]) -> Option<AllanSolution> {
         let n = self.points.len();
         let covariance = self.covariance(&by.map(|x| x.max(0.0)));
         let reduced = |part: &f64| {
@@ -215,7 +215,7 @@ impl FitProblem<'_> {
         let inverse = (scaled.transpose() * &scaled).try_inverse()?;
         let found = &inverse * (scaled.transpose() * &b);
         let left = (&b - &scaled * &found).norm_squared();
-        let mut out = Solution { x: [0.0; TERMS], covariance: DMatrix::zeros(TERMS, TERMS), left };
+        let mut out = AllanSolution { x: [0.0; TERMS], covariance: DMatrix::zeros(TERMS, TERMS), left };
         for (i, &k) in kept.iter().enumerate() {
             out.x[k] = found[i] / scale[i];
             for (j, &l) in kept.iter().enumerate() {
@@ -226,7 +226,7 @@ impl FitProblem<'_> {
     }
 
     /// Least squares as [`Self::solve`], with weights from its own solution.
-    fn settle(&self, kept: &[usize]) -> Option<Solution> {
+    fn settle(&self, kept: &[usize]) -> Option<AllanSolution> {
         let mut by = [0.0; TERMS];
         // initial weights: each noise as large as it can be alone
         for &k in kept {
@@ -267,7 +267,7 @@ impl FitProblem<'_> {
 
     /// Standard deviation of the squared coefficient of `k` if only the noises `others` are present,
     /// with the coefficients of `solved`.
-    fn without(&self, others: &[usize], solved: &Solution, k: usize) -> Option<f64> {
+    fn without(&self, others: &[usize], solved: &AllanSolution, k: usize) -> Option<f64> {
         let mut by = solved.x;
         by[k] = 0.0;
         // without others, the noise itself gives the weights
@@ -279,7 +279,7 @@ impl FitProblem<'_> {
     /// probability 1 - [`LIMIT`]: estimate and standard deviation are those by its own weights (Neyman). The
     /// estimate is skewed to the right, so the normal quantile is on the safe side. An estimate below zero
     /// counts as zero: chance would else give limits far below what the record resolves.
-    fn limit(&self, others: &[usize], solved: &Solution, k: usize) -> Option<f64> {
+    fn limit(&self, others: &[usize], solved: &AllanSolution, k: usize) -> Option<f64> {
         let all = Self::with(others, k);
         let beyond = |x: f64| -> Option<bool> {
             let mut by = solved.x;

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use statrs::function::erf::erfc;
 
-use crate::covariance::{Covariance, Form};
+use crate::covariance::{Covariance, CovarianceForm};
 use crate::decomposition::singular_values;
 use crate::error::EkfError;
 
@@ -73,7 +73,7 @@ impl Nees {
     /// # Errors
     /// [`EkfError`] unless `p` is symmetric and positive definite.
     pub fn new(p: &DMatrix<f64>) -> Result<Self, EkfError> {
-        Self::of_covariance(&Covariance::new("P", p, Form::Ud)?)
+        Self::of_covariance(&Covariance::new("P", p, CovarianceForm::Ud)?)
     }
 
     /// Takes the factors of the covariance of a filter, without computation in the UD form.

@@ -13,7 +13,7 @@ use crate::transition::{Transition, dot};
 
 /// Storage form of the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Form {
+pub enum CovarianceForm {
     /// P, updated in Joseph's form.
     #[default]
     Joseph,
@@ -105,7 +105,7 @@ pub struct Gain {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
     n: usize,
-    form: Form,
+    form: CovarianceForm,
     /// Column by column: P (symmetric), or U (unit upper triangular, diagonal not stored).
     m: Vec<f64>,
     /// The diagonal of D in the UD form.
@@ -118,11 +118,11 @@ impl Covariance {
     ///
     /// # Errors
     /// [`EkfError`] unless `p` is finite, symmetric and positive definite.
-    pub fn new(what: &'static str, p: &DMatrix<f64>, form: Form) -> Result<Self, EkfError> {
+    pub fn new(what: &'static str, p: &DMatrix<f64>, form: CovarianceForm) -> Result<Self, EkfError> {
         let n = p.nrows();
         check_symmetric(what, p, n)?;
         let (u, d) = ud_factors(what, p, true)?;
-        let m = if form == Form::Joseph { p } else { &u };
+        let m = if form == CovarianceForm::Joseph { p } else { &u };
         Ok(Self { n, form, m: m.as_slice().to_vec(), d, scratch: Vec::new() })
     }
 
@@ -135,8 +135,8 @@ impl Covariance {
     pub fn matrix(&self) -> DMatrix<f64> {
         let n = self.n;
         match self.form {
-            Form::Joseph => DMatrix::from_column_slice(n, n, &self.m),
-            Form::Ud => {
+            CovarianceForm::Joseph => DMatrix::from_column_slice(n, n, &self.m),
+            CovarianceForm::Ud => {
                 let u = DMatrix::from_fn(n, n, |i, j| self.u(i, j));
                 let mut scaled = u.clone();
                 for (j, &d) in self.d.iter().enumerate() {
@@ -151,8 +151,10 @@ impl Covariance {
     pub fn sigmas(&self) -> Vec<f64> {
         (0..self.n)
             .map(|i| match self.form {
-                Form::Joseph => self.m[i * self.n + i].max(0.0).sqrt(),
-                Form::Ud => (i..self.n).map(|j| self.u(i, j).powi(2) * self.d[j]).sum::<f64>().sqrt(),
+                CovarianceForm::Joseph => self.m[i * self.n + i].max(0.0).sqrt(),
+                CovarianceForm::Ud => {
+                    (i..self.n).map(|j| self.u(i, j).powi(2) * self.d[j]).sum::<f64>().sqrt()
+                }
             })
             .collect()
     }
@@ -164,12 +166,12 @@ impl Covariance {
     pub fn variance(&self, c: &[(usize, f64)]) -> Result<f64, EkfError> {
         check_entries("c", c, self.n)?;
         Ok(match self.form {
-            Form::Joseph => {
+            CovarianceForm::Joseph => {
                 let row = |i: usize| c.iter().map(|&(j, b)| b * self.m[j * self.n + i]).sum::<f64>();
                 c.iter().map(|&(i, a)| a * row(i)).sum()
             }
             // the columns of U first: large variances cancel there, not in P
-            Form::Ud => (0..self.n)
+            CovarianceForm::Ud => (0..self.n)
                 .map(|j| c.iter().map(|&(i, a)| a * self.u(i, j)).sum::<f64>().powi(2) * self.d[j])
                 .sum(),
         })
@@ -196,8 +198,8 @@ impl Covariance {
     /// Propagates the covariance for a step that was checked.
     pub(crate) fn propagate_checked(&mut self, phi: &Transition, noise: &ProcessNoise) {
         match self.form {
-            Form::Joseph => self.propagate_full(phi, noise),
-            Form::Ud => self.propagate_ud(phi, noise),
+            CovarianceForm::Joseph => self.propagate_full(phi, noise),
+            CovarianceForm::Ud => self.propagate_ud(phi, noise),
         }
     }
 
@@ -304,8 +306,8 @@ impl Covariance {
     pub(crate) fn update_checked(&mut self, output: &ScalarOutput, gain: &mut Gain) {
         gain.k.resize(self.n, 0.0);
         match self.form {
-            Form::Joseph => self.update_joseph(output, gain),
-            Form::Ud => self.update_bierman(output, gain),
+            CovarianceForm::Joseph => self.update_joseph(output, gain),
+            CovarianceForm::Ud => self.update_bierman(output, gain),
         }
     }
 
@@ -391,8 +393,8 @@ impl Covariance {
     /// [`EkfError::NotPositiveDefinite`] when P itself has lost it.
     pub(crate) fn factors(&self) -> Result<(Vec<f64>, Vec<f64>), EkfError> {
         match self.form {
-            Form::Ud => Ok((self.m.clone(), self.d.clone())),
-            Form::Joseph => {
+            CovarianceForm::Ud => Ok((self.m.clone(), self.d.clone())),
+            CovarianceForm::Joseph => {
                 let (u, d) = ud_factors("P", &self.matrix(), true)?;
                 Ok((u.as_slice().to_vec(), d))
             }

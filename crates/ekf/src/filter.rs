@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::consistency::{Nees, chi_square_quantile};
-use crate::covariance::{Covariance, Form, Gain, ProcessNoise, ScalarOutput};
+use crate::covariance::{Covariance, CovarianceForm, Gain, ProcessNoise, ScalarOutput};
 use crate::error::{EkfError, check, check_column, check_symmetric, is_positive};
 use crate::integrate::runge_kutta;
 use crate::manifold::Manifold;
@@ -16,7 +16,7 @@ use crate::transition::Transition;
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector, dmatrix, dvector};
-/// use obsdeg_ekf::{Filter, Form, Measurement, Process};
+/// use obsdeg_ekf::{CovarianceForm, Filter, Measurement, Process};
 ///
 /// /// A constant rate: x = (angle, rate), the angle measured.
 /// struct Turn;
@@ -33,7 +33,8 @@ use crate::transition::Transition;
 ///     fn jacobian(&self, _: f64, _: &DVector<f64>) -> DMatrix<f64> { dmatrix![1.0, 0.0] }
 ///     fn noise(&self, _: f64) -> DMatrix<f64> { dmatrix![1e-6] }
 /// }
-/// let mut filter = Filter::new(DVector::zeros(2), &(DMatrix::identity(2, 2) * 100.0), Form::Joseph)?;
+/// let p0 = DMatrix::identity(2, 2) * 100.0;
+/// let mut filter = Filter::new(DVector::zeros(2), &p0, CovarianceForm::Joseph)?;
 /// for t in 0..50 {
 ///     filter.update(&Angle, t as f64, &dvector![0.5 * t as f64])?;
 ///     filter.predict(&Turn, t as f64, 1.0, 1)?;
@@ -102,7 +103,7 @@ impl<X: Manifold> Filter<X> {
     ///
     /// # Errors
     /// [`EkfError`] unless `x0` is finite and `p0` positive definite.
-    pub fn new(x0: X, p0: &DMatrix<f64>, form: Form) -> Result<Self, EkfError> {
+    pub fn new(x0: X, p0: &DMatrix<f64>, form: CovarianceForm) -> Result<Self, EkfError> {
         let n = x0.dimension();
         check_state("x0", &x0)?;
         check("P0", p0, (n, n))?;
@@ -209,7 +210,7 @@ impl<X: Manifold> Filter<X> {
         out: &mut Innovation,
     ) -> Result<Covariance, EkfError> {
         let posterior =
-            Posterior { prediction: &self.x, prior: Nees::of_covariance(&self.covariance)?, seen };
+            StateProbability { prediction: &self.x, prior: Nees::of_covariance(&self.covariance)?, seen };
         let mut after = self.covariance.clone();
         let mut before = vec![0.0; self.x.dimension()];
         let mut least = posterior.cost(&before, residual)?;
@@ -283,13 +284,13 @@ impl<'a, M> Present<'a, M> {
 }
 
 /// Probability of states about a prediction, given a measurement.
-struct Posterior<'a, X, M> {
+struct StateProbability<'a, X, M> {
     prediction: &'a X,
     prior: Nees,
     seen: &'a Present<'a, M>,
 }
 
-impl<X: Manifold, M: Measurement<X>> Posterior<'_, X, M> {
+impl<X: Manifold, M: Measurement<X>> StateProbability<'_, X, M> {
     /// Twice the negative logarithm of the probability of the state at `delta`, up to a constant.
     fn cost(&self, delta: &[f64], residual: &[f64]) -> Result<f64, EkfError> {
         let variances = &self.seen.whitener.variances;

@@ -27,7 +27,7 @@ pub mod noise;
 pub mod smoother;
 pub mod transition;
 
-pub use covariance::{Covariance, Form, Gain, ProcessNoise, ScalarOutput};
+pub use covariance::{Covariance, CovarianceForm, Gain, ProcessNoise, ScalarOutput};
 pub use error::EkfError;
 pub use filter::{Filter, Innovation, Update};
 pub use information::SquareRootInformation;
@@ -35,7 +35,7 @@ pub use linear::{Gains, Stage};
 pub use manifold::Manifold;
 pub use model::{Measurement, Motion, Process};
 pub use noise::{BiasState, SensorNoise};
-pub use smoother::{Interval, Smoothed};
+pub use smoother::{FixedInterval, Smoothed};
 pub use transition::Transition;
 
 /// The examples of the README, as tests.

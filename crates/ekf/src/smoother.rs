@@ -14,7 +14,7 @@ use crate::transition::Transition;
 ///
 /// ```
 /// use nalgebra::{DMatrix, DVector, dmatrix, dvector};
-/// use obsdeg_ekf::{Filter, Form, Interval, Measurement, Process, Transition};
+/// use obsdeg_ekf::{CovarianceForm, Filter, FixedInterval, Measurement, Process, Transition};
 ///
 /// /// A random walk, seen every second.
 /// struct Walk;
@@ -30,8 +30,8 @@ use crate::transition::Transition;
 ///     fn jacobian(&self, _: f64, _: &DVector<f64>) -> DMatrix<f64> { dmatrix![1.0] }
 ///     fn noise(&self, _: f64) -> DMatrix<f64> { dmatrix![1.0] }
 /// }
-/// let mut filter = Filter::new(dvector![0.0], &dmatrix![1.0], Form::Joseph)?;
-/// let mut interval = Interval::new(&filter);
+/// let mut filter = Filter::new(dvector![0.0], &dmatrix![1.0], CovarianceForm::Joseph)?;
+/// let mut interval = FixedInterval::new(&filter);
 /// for (t, z) in [0.3, 1.1, 0.9].into_iter().enumerate() {
 ///     filter.predict(&Walk, t as f64, 1.0, 1)?;
 ///     interval.predicted(&filter, Transition::new(&dmatrix![1.0])?);
@@ -44,7 +44,7 @@ use crate::transition::Transition;
 /// # Ok::<(), obsdeg_ekf::EkfError>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct Interval<X = DVector<f64>> {
+pub struct FixedInterval<X = DVector<f64>> {
     moments: Vec<Moment<X>>,
 }
 
@@ -66,7 +66,7 @@ pub struct Smoothed<X> {
     pub p: DMatrix<f64>,
 }
 
-impl<X: Manifold> Interval<X> {
+impl<X: Manifold> FixedInterval<X> {
     /// Record that starts with the present estimate of the filter.
     pub fn new(filter: &Filter<X>) -> Self {
         let now = state(filter);

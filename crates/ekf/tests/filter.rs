@@ -7,7 +7,7 @@ use obsdeg_ekf::integrate::{runge_kutta, van_loan};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::model::central_difference;
 use obsdeg_ekf::{
-    Covariance, EkfError, Filter, Form, Gain, Measurement, Process, ProcessNoise, ScalarOutput,
+    Covariance, CovarianceForm, EkfError, Filter, Gain, Measurement, Process, ProcessNoise, ScalarOutput,
     SquareRootInformation, Stage, Transition,
 };
 use proptest::prelude::*;
@@ -84,7 +84,7 @@ proptest! {
         let x = &step.x + &k * &innovation;
         let after = (DMatrix::identity(n, n) - &k * &model.h) * &p;
         let nis = (innovation.transpose() * inverse * &innovation)[(0, 0)];
-        for form in [Form::Joseph, Form::Ud] {
+        for form in [CovarianceForm::Joseph, CovarianceForm::Ud] {
             let mut filter = Filter::new(x0.clone(), &p0, form).expect("valid");
             filter.predict(&model, 0.0, 0.1, 8).expect("valid");
             prop_assert!(close(&filter.covariance().matrix(), &p, 1e-10), "{form:?} predict");
@@ -127,7 +127,7 @@ proptest! {
             if noisy[i] && noisy[j] { e[50 + i] * e[50 + j] + 0.5 * identity[(i, j)] } else { 0.0 }
         });
         let expected = &phi * &p0 * phi.transpose() + &q;
-        for form in [Form::Joseph, Form::Ud] {
+        for form in [CovarianceForm::Joseph, CovarianceForm::Ud] {
             let mut p = Covariance::new("P0", &p0, form).expect("valid");
             let noise = ProcessNoise::new(&q).expect("valid");
             p.propagate(&Transition::new(&phi).expect("valid"), &noise).expect("of one size");
@@ -163,7 +163,7 @@ proptest! {
             information.add(&(&row * &to_now)).expect("valid");
         }
         let expected = &to_now * information.covariance().expect("regular") * to_now.transpose();
-        for form in [Form::Joseph, Form::Ud] {
+        for form in [CovarianceForm::Joseph, CovarianceForm::Ud] {
             let mut last = DMatrix::zeros(n, n);
             let p0 = Covariance::new("P0", &p0, form).expect("valid");
             covariance_pass(std::slice::from_ref(&stage), p0, |_, p| last = p.matrix()).expect("shapes");
@@ -239,7 +239,7 @@ fn jacobians_are_derivatives_and_phi_is_the_derivative_of_the_flow() {
 fn a_right_model_gives_consistent_errors_and_white_innovations() {
     let (runs, steps, dt) = (200, 60, 0.05);
     let p0 = dmatrix![0.01, 0.0; 0.0, 0.04];
-    for form in [Form::Joseph, Form::Ud] {
+    for form in [CovarianceForm::Joseph, CovarianceForm::Ud] {
         let (mut nees, mut nis, mut white) = (0.0, 0.0, Vec::new());
         for run in 0..runs {
             let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(run);
@@ -293,7 +293,7 @@ fn state_pass_is_the_filter_step_by_step() {
     let z = |step: usize, j: usize| ((step * 2 + j) as f64).sin();
     let gains = covariance_pass(
         std::slice::from_ref(&stage),
-        Covariance::new("P0", &p0, Form::Joseph).expect("valid"),
+        Covariance::new("P0", &p0, CovarianceForm::Joseph).expect("valid"),
         |_, _| {},
     )
     .expect("shapes");
@@ -321,7 +321,7 @@ fn the_ud_form_keeps_what_a_diffuse_prior_costs() {
         ScalarOutput { h: vec![(0, 1.0), (1, -1.0)], r: 1e-4 },
     ];
     let p0 = DMatrix::identity(2, 2) * 1e18;
-    let mut p = Covariance::new("P0", &p0, Form::Ud).expect("valid");
+    let mut p = Covariance::new("P0", &p0, CovarianceForm::Ud).expect("valid");
     let mut gain = Gain { k: Vec::new(), s: 0.0 };
     for output in &outputs {
         p.update(output, &mut gain).expect("valid");
@@ -342,8 +342,9 @@ fn singular_values_of_a_matrix_of_ones() {
 #[test]
 fn wrong_inputs_are_refused_by_name() {
     let (x, unit) = (dvector![0.0, 0.0], DMatrix::<f64>::identity(2, 2));
-    let new =
-        |x: &DVector<f64>, p: &DMatrix<f64>| Filter::new(x.clone(), p, Form::Joseph).expect_err("refused");
+    let new = |x: &DVector<f64>, p: &DMatrix<f64>| {
+        Filter::new(x.clone(), p, CovarianceForm::Joseph).expect_err("refused")
+    };
     assert_eq!(new(&x, &DMatrix::identity(3, 3)).to_string(), "P0 has shape 3x3; expected 2x2");
     assert!(new(&dvector![0.0, f64::NAN], &unit).to_string().starts_with("x0 is not finite"));
     assert!(new(&x, &dmatrix![1.0, 0.0; 0.0, -1.0]).to_string().starts_with("P0 is not positive definite"));
@@ -354,7 +355,7 @@ fn wrong_inputs_are_refused_by_name() {
     ));
     assert!(ProcessNoise::new(&dmatrix![1.0, 1.0; 1.0, 1.0]).is_ok());
     assert!(Transition::new(&dmatrix![1.0, f64::INFINITY; 0.0, 1.0]).is_err());
-    let mut filter = Filter::new(x, &unit, Form::Ud).expect("valid");
+    let mut filter = Filter::new(x, &unit, CovarianceForm::Ud).expect("valid");
     let wrong = Matrices { f: unit.clone(), q: unit.clone(), h: unit.clone(), r: unit.clone() * -1.0 };
     let refused = filter.update(&wrong, 0.0, &dvector![0.0, 0.0]).expect_err("refused");
     assert!(refused.to_string().starts_with("R is not positive definite"), "{refused}");
@@ -367,7 +368,7 @@ fn wrong_inputs_are_refused_by_name() {
         steps: 1,
     };
     let pass = |n: usize| {
-        let prior = Covariance::new("P0", &DMatrix::identity(n, n), Form::Ud).expect("valid");
+        let prior = Covariance::new("P0", &DMatrix::identity(n, n), CovarianceForm::Ud).expect("valid");
         covariance_pass(std::slice::from_ref(&stage), prior, |_, _| {}).expect_err("refused").to_string()
     };
     assert_eq!(pass(3), "Phi has shape 2x2; expected 3x3");

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3, dm
 use obsdeg_ekf::consistency::{Nees, chi_square_band};
 use obsdeg_ekf::linear::{covariance_pass, filter_pass, smoothed_start, state_pass};
 use obsdeg_ekf::{
-    Covariance, EkfError, Filter, Form, Gain, Interval, Manifold, Measurement, Motion, ProcessNoise,
-    ScalarOutput, Stage, Transition, Update,
+    Covariance, CovarianceForm, EkfError, Filter, FixedInterval, Gain, Manifold, Measurement, Motion,
+    ProcessNoise, ScalarOutput, Stage, Transition, Update,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -124,7 +124,7 @@ fn an_attitude_filter_is_consistent() {
             0.1 * normal(),
             0.1 * normal(),
         ]);
-        let mut filter = Filter::new(start, &p0, Form::Ud).expect("valid");
+        let mut filter = Filter::new(start, &p0, CovarianceForm::Ud).expect("valid");
         for k in 0..steps {
             let t = dt * f64::from(k);
             let rate = Vector3::new(t.sin(), (0.7 * t).cos(), 0.4);
@@ -155,7 +155,7 @@ fn an_attitude_filter_is_consistent() {
 fn a_reset_carries_the_covariance() {
     let start = Attitude { q: UnitQuaternion::identity(), bias: Vector3::zeros() };
     let p0 = DMatrix::identity(6, 6) * 0.25;
-    let mut filter = Filter::new(start.clone(), &p0, Form::Joseph).expect("valid");
+    let mut filter = Filter::new(start.clone(), &p0, CovarianceForm::Joseph).expect("valid");
     let mut truth = start.clone();
     truth.retract(&[0.6, -0.4, 0.5, 0.0, 0.0, 0.0]);
     let z: Vec<Option<f64>> = Stars.h(0.0, &truth).iter().copied().map(Some).collect();
@@ -209,7 +209,7 @@ fn iteration_finds_the_most_probable_state() {
         width *= 0.7;
     }
     let updated = |how: &Update| {
-        let mut filter = Filter::new(x0.clone(), &p0, Form::Ud).expect("valid");
+        let mut filter = Filter::new(x0.clone(), &p0, CovarianceForm::Ud).expect("valid");
         let seen = filter.update_with(&Distance, 0.0, &[Some(1.6)], how).expect("finite");
         (filter.x().clone(), seen)
     };
@@ -243,7 +243,7 @@ impl Measurement for Both {
 #[test]
 fn what_is_missing_or_gated_is_left_out() {
     let p0 = dmatrix![4.0, 1.0; 1.0, 3.0];
-    let fresh = || Filter::new(dvector![0.0, 0.0], &p0, Form::Joseph).expect("valid");
+    let fresh = || Filter::new(dvector![0.0, 0.0], &p0, CovarianceForm::Joseph).expect("valid");
     // one component alone: K = P h^T / (p + r)
     let mut filter = fresh();
     let seen = filter.update_with(&Both, 0.0, &[None, Some(2.5)], &Update::default()).expect("valid");
@@ -270,7 +270,8 @@ fn what_is_missing_or_gated_is_left_out() {
 
 #[test]
 fn a_jump_moves_the_state_and_its_covariance() {
-    let mut filter = Filter::new(dvector![1.0, 2.0], &dmatrix![1.0, 0.0; 0.0, 4.0], Form::Ud).expect("valid");
+    let mut filter =
+        Filter::new(dvector![1.0, 2.0], &dmatrix![1.0, 0.0; 0.0, 4.0], CovarianceForm::Ud).expect("valid");
     let exchange = Transition::new(&dmatrix![0.0, 1.0; 1.0, 0.0]).expect("finite");
     let noise = ProcessNoise::new(&dmatrix![0.5, 0.0; 0.0, 0.0]).expect("Q");
     filter.jump(dvector![2.0, 1.0], &exchange, &noise).expect("valid");
@@ -334,8 +335,8 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
             dmatrix![self.0.r]
         }
     }
-    let mut filter = Filter::new(x0.clone(), &p0, Form::Ud).expect("valid");
-    let mut interval = Interval::new(&filter);
+    let mut filter = Filter::new(x0.clone(), &p0, CovarianceForm::Ud).expect("valid");
+    let mut interval = FixedInterval::new(&filter);
     for &z in &z {
         filter.jump(&phi * filter.x(), &stage.transition, &stage.noise).expect("valid");
         interval.predicted(&filter, stage.transition.clone());
@@ -350,7 +351,7 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
     }
 
     let stages = std::slice::from_ref(&stage);
-    let prior = Covariance::new("P0", &p0, Form::Ud).expect("definite");
+    let prior = Covariance::new("P0", &p0, CovarianceForm::Ud).expect("definite");
     let (mut x, mut whitened) = (x0.as_slice().to_vec(), Vec::new());
     let fill = |step: usize, _: usize, out: &mut [f64]| out[0] = z[step];
     let gains = filter_pass(stages, prior.clone(), &mut x, fill, |_, _, _, w| whitened.extend_from_slice(w))
@@ -380,7 +381,7 @@ fn smoothers_are_least_squares_on_the_whole_interval() {
 /// The covariance, too, refuses numbers that are not finite and wrong shapes.
 #[test]
 fn wrong_outputs_and_steps_are_refused() {
-    let mut p = Covariance::new("P0", &DMatrix::identity(2, 2), Form::Ud).expect("definite");
+    let mut p = Covariance::new("P0", &DMatrix::identity(2, 2), CovarianceForm::Ud).expect("definite");
     let before = p.clone();
     let mut gain = Gain { k: Vec::new(), s: 0.0 };
     let mut update = |h: Vec<(usize, f64)>, r: f64| {
@@ -404,7 +405,7 @@ fn wrong_outputs_and_steps_are_refused() {
     let mut wrong = Attitude { q: UnitQuaternion::from_rotation_matrix(&r), bias: Vector3::zeros() };
     wrong.bias[0] = f64::NAN;
     assert!(matches!(
-        Filter::new(wrong, &DMatrix::identity(6, 6), Form::Ud),
+        Filter::new(wrong, &DMatrix::identity(6, 6), CovarianceForm::Ud),
         Err(EkfError::StateNotFinite { what: "x0" })
     ));
 }

@@ -2,12 +2,12 @@
 //! In a prime field that contains the cosines of decimal degrees the determinant is zero, not small.
 #![allow(clippy::print_stdout, reason = "an example")]
 
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::turn::common_order;
-use obsdeg_exact::{Echelon, PrimeError, RootField, SplitMix64, Turn};
+use obsdeg_exact::{Echelon, PrimeError, RootField, SplitMix64, TurnFraction};
 
 fn main() -> Result<(), PrimeError> {
-    let angles = [20, 40, 80].map(|deg| Turn::from_nanodeg(deg * 1_000_000_000));
+    let angles = [20, 40, 80].map(|deg| TurnFraction::from_nanodeg(deg * 1_000_000_000));
     let [a, b, c] = angles.map(|angle| angle.cos_sin_f64().0);
     println!("in doubles: {:e}", 1.0 - 8.0 * a * b * c);
 
@@ -25,7 +25,7 @@ fn main() -> Result<(), PrimeError> {
     }
     // certainty of two fields that agree: a determinant of three rows, each below 2^4 without
     // denominators
-    let claim = Claim { unknowns: 3, decisions: 1, order, row_degree: 0, row_bits: 4.0 };
+    let claim = RankClaim { unknowns: 3, decisions: 1, order, row_degree: 0, row_bits: 4.0 };
     println!("wrong with probability below {:.0e}", error_bound(&claim, 2));
     Ok(())
 }

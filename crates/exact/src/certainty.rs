@@ -2,7 +2,7 @@
 
 /// Quantities that the error bound depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Claim {
+pub struct RankClaim {
     /// Number of unknowns: no minor that decides a rank is larger.
     pub unknowns: usize,
     /// Number of rank decisions that the verdict rests on.
@@ -30,11 +30,11 @@ pub struct Claim {
 /// ([`crate::SplitMix64::of`]); every field has a stream of its own.
 ///
 /// ```
-/// use obsdeg_exact::certainty::{Claim, error_bound};
-/// let claim = Claim { unknowns: 15, decisions: 48, order: 24, row_degree: 4, row_bits: 12.0 };
+/// use obsdeg_exact::certainty::{RankClaim, error_bound};
+/// let claim = RankClaim { unknowns: 15, decisions: 48, order: 24, row_degree: 4, row_bits: 12.0 };
 /// assert!(error_bound(&claim, 2) < 1e-20);
 /// ```
-pub fn error_bound(claim: &Claim, fields: i32) -> f64 {
+pub fn error_bound(claim: &RankClaim, fields: i32) -> f64 {
     let two60 = 2f64.powi(60);
     let phi = [2u64, 3, 5]
         .iter()
@@ -59,10 +59,10 @@ mod tests {
         let close = |found: f64, expected: f64| {
             assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} instead of {expected:e}");
         };
-        let nothing = Claim { unknowns: 3, decisions: 7, order: 4, row_degree: 0, row_bits: 0.0 };
+        let nothing = RankClaim { unknowns: 3, decisions: 7, order: 4, row_degree: 0, row_bits: 0.0 };
         assert_eq!(error_bound(&nothing, 1), 0.0);
         // 7 decisions, each a minor of degree 3 * 5
-        let point = Claim { row_degree: 5, ..nothing };
+        let point = RankClaim { row_degree: 5, ..nothing };
         close(error_bound(&point, 1), 105.0 / TWO60);
         close(error_bound(&point, 2), (105.0 / TWO60) * (105.0 / TWO60));
         // minors of 3 * 40 bits have at most two prime factors of 60 bits, out of 2^60 / (phi ln 2^61)
@@ -70,21 +70,21 @@ mod tests {
         // = 42.281978...
         let ln = 42.281_978_014_156_64;
         for (order, phi) in [(4, 2.0), (24, 8.0), (360, 96.0), (1000, 400.0), (7_200, 1920.0)] {
-            let prime = Claim { row_bits: 40.0, order, ..nothing };
+            let prime = RankClaim { row_bits: 40.0, order, ..nothing };
             close(error_bound(&prime, 1), 7.0 * 2.0 * phi * ln / TWO60);
-            let both = Claim { row_degree: 5, ..prime };
+            let both = RankClaim { row_degree: 5, ..prime };
             close(error_bound(&both, 1), (105.0 + 14.0 * phi * ln) / TWO60);
         }
     }
 
     #[test]
     fn finer_angles_weaken_the_bound_and_fields_multiply() {
-        let claim = |order| Claim { unknowns: 15, decisions: 48, order, row_degree: 4, row_bits: 12.0 };
+        let claim = |order| RankClaim { unknowns: 15, decisions: 48, order, row_degree: 4, row_bits: 12.0 };
         let coarse = error_bound(&claim(24), 2);
         let fine = error_bound(&claim(360_000_000_000), 2);
         assert!(coarse < fine && fine < 1e-4, "{coarse:e} {fine:e}");
         let one = error_bound(&claim(24), 1);
         assert!((error_bound(&claim(24), 2) / (one * one) - 1.0).abs() < 1e-12);
-        assert_eq!(error_bound(&Claim { decisions: usize::MAX, ..claim(24) }, 1), 1.0);
+        assert_eq!(error_bound(&RankClaim { decisions: usize::MAX, ..claim(24) }, 1), 1.0);
     }
 }

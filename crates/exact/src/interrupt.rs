@@ -74,20 +74,20 @@ pub fn check() {
 
 /// Handle with which the parts of this thread's work on other threads end with it.
 #[derive(Debug, Clone)]
-pub(crate) struct Parts(Option<Arc<AtomicBool>>);
+pub(crate) struct InterruptHandle(Option<Arc<AtomicBool>>);
 
 /// Handle for the parts of the work of this thread.
-pub(crate) fn parts() -> Parts {
+pub(crate) fn parts() -> InterruptHandle {
     let hearing = CANCELLATION.take();
     let wanted = match &hearing {
         Some(Cancellation::Flag(wanted)) => Some(wanted.clone()),
         _ => None,
     };
     CANCELLATION.set(hearing);
-    Parts(wanted)
+    InterruptHandle(wanted)
 }
 
-impl Parts {
+impl InterruptHandle {
     /// Runs a part on the calling thread. It ends with the whole.
     pub(crate) fn part<T>(&self, work: impl FnOnce() -> T) -> T {
         match &self.0 {

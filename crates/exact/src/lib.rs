@@ -63,4 +63,4 @@ pub use reals::{RealSpace, Reals};
 pub use rng::SplitMix64;
 pub use scalars::{RowSpace, Scalars};
 pub use transform::Transform;
-pub use turn::Turn;
+pub use turn::TurnFraction;

@@ -189,7 +189,7 @@ fn square_roots(k: &RootField) -> [u64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{SplitMix64, Turn};
+    use crate::{SplitMix64, TurnFraction};
     use proptest::prelude::*;
 
     fn ratio(num: i64, den: i64) -> Ratio {
@@ -264,7 +264,7 @@ mod tests {
         let k = RootField::random(24, &mut SplitMix64::new(11)).expect("order");
         let images = embeddings(24).map(|a| {
             let k = k.conjugate(a);
-            k.cos_sin(k.unit_circle(Turn::from_nanodeg(15_000_000_000)).expect("fits")).0
+            k.cos_sin(k.unit_circle(TurnFraction::from_nanodeg(15_000_000_000)).expect("fits")).0
         });
         let cos15 = Radical::recover(&k, images).expect("a radical");
         assert_eq!(cos15.to_string(), "sqrt(2)/4+sqrt(6)/4");
@@ -284,7 +284,7 @@ mod tests {
         let k = RootField::random(72, &mut SplitMix64::new(5)).expect("order");
         let images = embeddings(72).map(|a| {
             let k = k.conjugate(a);
-            k.cos_sin(k.unit_circle(Turn::from_nanodeg(20_000_000_000)).expect("fits")).0
+            k.cos_sin(k.unit_circle(TurnFraction::from_nanodeg(20_000_000_000)).expect("fits")).0
         });
         assert_eq!(Radical::recover(&k, images), None);
     }

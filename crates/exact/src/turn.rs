@@ -8,13 +8,13 @@ const FULL_NANODEG: i64 = 360_000_000_000;
 /// An angle of a whole number of 1e-9 degrees, reduced to one turn: `0 <= nanodeg < 360e9`.
 ///
 /// ```
-/// use obsdeg_exact::Turn;
-/// assert_eq!(Turn::from_nanodeg(-90_000_000_000).degrees(), 270.0);
+/// use obsdeg_exact::TurnFraction;
+/// assert_eq!(TurnFraction::from_nanodeg(-90_000_000_000).degrees(), 270.0);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-pub struct Turn(i64);
+pub struct TurnFraction(i64);
 
-impl Turn {
+impl TurnFraction {
     /// The angle of `nanodeg` 1e-9 degrees.
     pub fn from_nanodeg(nanodeg: i64) -> Self {
         Self(nanodeg.rem_euclid(FULL_NANODEG))
@@ -56,14 +56,14 @@ impl Turn {
 }
 
 /// Least order `n`, a multiple of 24, for which the n-th roots of unity represent every given angle.
-pub fn common_order(angles: impl IntoIterator<Item = Turn>) -> u64 {
+pub fn common_order(angles: impl IntoIterator<Item = TurnFraction>) -> u64 {
     let unit = angles.into_iter().fold(FULL_NANODEG as u64 / 24, |u, a| gcd(u, a.0.unsigned_abs()));
     FULL_NANODEG as u64 / unit
 }
 
 impl RootField {
     /// The image of `exp(i angle)`; `None` if the order of this field does not represent the angle.
-    pub fn unit_circle(&self, angle: Turn) -> Option<u64> {
+    pub fn unit_circle(&self, angle: TurnFraction) -> Option<u64> {
         let unit = FULL_NANODEG / self.order as i64;
         (angle.0 % unit == 0).then(|| self.field.pow(self.root, (angle.0 / unit) as u64))
     }
@@ -92,10 +92,10 @@ mod tests {
 
     #[test]
     fn known_values_hold_in_the_field() {
-        let deg = |d: i64| Turn::from_nanodeg(d * 1_000_000_000);
+        let deg = |d: i64| TurnFraction::from_nanodeg(d * 1_000_000_000);
         let k = RootField::random(common_order([deg(10)]), &mut SplitMix64::new(3)).expect("order");
         let f = &k.field;
-        let cs = |a: Turn| k.cos_sin(k.unit_circle(a).expect("angle fits"));
+        let cs = |a: TurnFraction| k.cos_sin(k.unit_circle(a).expect("angle fits"));
         assert_eq!(cs(deg(60)).0, f.from_ratio(1, 2));
         assert_eq!(cs(deg(-90)), (0, f.from_i64(-1)));
         assert_eq!(cs(deg(180)), (f.from_i64(-1), 0));
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn orders_cover_the_angles() {
-        let nano = Turn::from_nanodeg;
+        let nano = TurnFraction::from_nanodeg;
         assert_eq!(common_order([]), 24);
         assert_eq!(common_order([nano(15_000_000_000), nano(-90_000_000_000)]), 24);
         assert_eq!(common_order([nano(10_000_000_000)]), 72);
@@ -123,8 +123,8 @@ mod tests {
 
     #[test]
     fn floats_snap_at_right_angles() {
-        assert_eq!(Turn::from_nanodeg(-90_000_000_000).cos_sin_f64(), (0.0, -1.0));
-        let (c, s) = Turn::from_nanodeg(30_000_000_000).cos_sin_f64();
+        assert_eq!(TurnFraction::from_nanodeg(-90_000_000_000).cos_sin_f64(), (0.0, -1.0));
+        let (c, s) = TurnFraction::from_nanodeg(30_000_000_000).cos_sin_f64();
         assert!((s - 0.5).abs() < 1e-15 && (c - 0.75f64.sqrt()).abs() < 1e-15);
     }
 }

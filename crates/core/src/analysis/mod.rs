@@ -16,14 +16,14 @@ use crate::degree::coefficient::{Coefficient, readable};
 use crate::degree::ensemble::{Verdicts, degrees};
 use crate::degree::status::Verdict;
 use crate::engine::EngineBusy;
-use crate::findings::{CombinationFinding, Judged, SchemeFindings};
+use crate::findings::{CombinationFinding, JudgedScheme, SchemeFindings};
 use crate::model::attitude::Matrix3;
 use crate::model::attitude::c_n_from_euler;
 use crate::model::path::TurnAt;
-use crate::model::platform::{Platform, Point};
+use crate::model::platform::{Platform, PlatformPoint};
 use crate::model::ring::Float;
 use crate::model::slew::{Slew, Turn};
-use crate::model::{Angle, Carry, OmittedModel, Position, Scheme, Source, Term, Unknowns};
+use crate::model::{Angle, Carry, ErrorSource, OmittedModel, Position, Scheme, Term, Unknowns};
 use crate::omitted::omitted_verdicts;
 use crate::remedies::Remedies;
 use crate::solution::FoundBy;
@@ -67,7 +67,7 @@ pub fn analyze(
     worker: Option<&mut Worker>,
 ) -> Result<Analysis, AnalysisError> {
     let platform = Platform::new(scheme.clone())?;
-    let judged = Judged::new(&platform, options.seed)?;
+    let judged = JudgedScheme::new(&platform, options.seed)?;
     let verdicts = &judged.verdicts;
     let built = worker.is_some();
     let worker = worker.filter(|_| options.solutions || options.formulas);
@@ -77,7 +77,8 @@ pub fn analyze(
     // with torquer or accelerometer errors, derivatives of Z during a turn contain its rate
     let course = scheme.by_course();
     let printed = AnalysisOptions { solutions: options.solutions && !course, ..options };
-    let mut printer = Printer { solver, options: printed, stations: stations(scheme), notes: Vec::new() };
+    let mut printer =
+        SolutionPrinter { solver, options: printed, stations: stations(scheme), notes: Vec::new() };
     printer.notes.extend(findings.accuracy.as_ref().err().map(ToString::to_string));
     let quantities = quantities(&platform, &findings, &mut printer)?;
     let combinations: Vec<CombinationReport> =
@@ -169,14 +170,14 @@ fn slew_note(scheme: &Scheme) -> Option<String> {
 }
 
 /// Turns functionals into printed solutions, and collects notes about those without one.
-struct Printer<'a> {
+struct SolutionPrinter<'a> {
     solver: Solver<'a>,
     options: AnalysisOptions,
     stations: Vec<StationLabel>,
     notes: Vec<String>,
 }
 
-impl Printer<'_> {
+impl SolutionPrinter<'_> {
     /// The solution of a functional of a known degree; a note when there is none to print.
     fn solution(&mut self, functional: &Functional, degree: usize, what: &str) -> Option<Solution> {
         if !self.options.solutions {
@@ -230,7 +231,7 @@ impl Printer<'_> {
 fn quantities(
     platform: &Platform,
     findings: &SchemeFindings,
-    printer: &mut Printer<'_>,
+    printer: &mut SolutionPrinter<'_>,
 ) -> Result<Vec<Quantity>, AnalysisError> {
     let SchemeFindings { verdicts, .. } = findings;
     let (scheme, seed) = (platform.scheme(), verdicts.seed);
@@ -266,7 +267,7 @@ fn quantities(
     Ok(out)
 }
 
-fn combination_report(c: &CombinationFinding, printer: &mut Printer<'_>) -> CombinationReport {
+fn combination_report(c: &CombinationFinding, printer: &mut SolutionPrinter<'_>) -> CombinationReport {
     let Verdict { status, degree } = c.verdict;
     CombinationReport {
         expression: c.name.clone(),
@@ -453,13 +454,15 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
          named without numbers",
     );
     say(
-        scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Platform && scheme.positions.len() > 1,
+        scheme.unknowns.have(ErrorSource::Rate)
+            && scheme.carry == Carry::Platform
+            && scheme.positions.len() > 1,
         "under platform carry a repositioning leaves psi in platform axes as it is, torquer errors \
          included: they act at positions and in rotations alone, as if nothing had been torqued in \
          between; real slews need inertial carry and a path",
     );
     say(
-        scheme.unknowns.have(Source::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
+        scheme.unknowns.have(ErrorSource::Rate) && scheme.carry == Carry::Reset && scheme.positions.len() > 1,
         "under reset carry what torquer errors leave in psi during a slew is part of the new psi: they act \
          at positions and in rotations alone",
     );
@@ -497,7 +500,7 @@ fn turns(platform: &Platform) -> Vec<Vec<Turn>> {
     if platform.paths().is_empty() {
         return Vec::new();
     }
-    let point = Point::in_floats(platform, 1.0, 1.0);
+    let point = PlatformPoint::in_floats(platform, 1.0, 1.0);
     let turn = |(from, turn): (Matrix3<f64>, &TurnAt<f64>)| {
         Slew::by(&from, &turn.axis.map(|x| x * turn.angle), 1.0).turn()
     };

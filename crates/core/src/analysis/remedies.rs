@@ -9,7 +9,7 @@ use crate::degree::staircase::Degrees;
 use crate::model::attitude::{cardinal, cardinal_names};
 use crate::model::platform::{Platform, RandomValues};
 use crate::model::{Position, Scheme, Unknowns};
-use crate::remedies::{Change, Directions, Information, Remedies, Remedy, Resolved};
+use crate::remedies::{CandidateInformation, Change, Directions, Remedies, Remedy, Resolved};
 
 /// Largest number of unknowns of a scheme to which attitudes are added: each of the 24 costs as much as half
 /// a verdict.
@@ -39,7 +39,7 @@ struct AttitudeCandidate {
     degrees: Vec<Option<usize>>,
     /// Rows of the attitude in the unobservable directions; `None` where the two schemes share no random
     /// values.
-    information: Option<Information<Field>>,
+    information: Option<CandidateInformation<Field>>,
 }
 
 /// Remedies of a judged scheme. At most `MOST_KNOWN` values, 24 attitudes and `MOST_PAIRS` pairs of each
@@ -114,7 +114,7 @@ pub(super) fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Op
 
 /// Entries of the rows of a longer scheme in the unobservable directions; `places` are the columns of this
 /// scheme's unknowns. Unknowns of the new position alone are eliminated.
-fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> Information<Field> {
+fn added(directions: &Directions<Field>, space: &Echelon, places: &[usize]) -> CandidateInformation<Field> {
     let own: Vec<usize> = (0..space.columns()).filter(|k| !places.contains(k)).collect();
     let field = space.field();
     let mut shared = Echelon::new(field, space.columns());
@@ -280,10 +280,11 @@ impl SchemeRemedySearch<'_> {
             let text = "two changes with an attitude among them: the turn to it acts as well";
             self.out.not_tried.push(text.into());
         }
-        let (names, attitudes): (Vec<String>, Vec<Information<Field>>) =
+        let (names, attitudes): (Vec<String>, Vec<CandidateInformation<Field>>) =
             candidates.into_iter().filter_map(|c| Some((c.attitude, c.information?))).unzip();
-        let values: Vec<Information<Field>> = self.open.iter().map(|&w| directions.known(&[w])).collect();
-        type List<'a> = &'a [Information<Field>];
+        let values: Vec<CandidateInformation<Field>> =
+            self.open.iter().map(|&w| directions.known(&[w])).collect();
+        type List<'a> = &'a [CandidateInformation<Field>];
         let kinds: [(List<'_>, Option<List<'_>>); 3] =
             [(&attitudes, None), (&attitudes, Some(&values)), (&values, None)];
         let mut complete = true;

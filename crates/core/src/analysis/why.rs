@@ -7,7 +7,7 @@ use super::remedies::{Stairs, degrees_knowing, stairs, with_attitudes};
 use super::{components, degrees_of, generic_angles};
 use crate::degree::rows::DerivativeRows;
 use crate::degree::{Degrees, PlatformRows, Verdict};
-use crate::findings::{AnalysisError, Judged};
+use crate::findings::{AnalysisError, JudgedScheme};
 use crate::model::attitude::cardinal_names;
 use crate::model::platform::{AZIMUTH, Platform};
 use crate::model::{Carry, Scheme, Unknowns};
@@ -36,7 +36,7 @@ pub fn explain(
 ) -> Result<Option<Why>, AnalysisError> {
     let platform = Platform::new(scheme.clone())?;
     let Some(column) = platform.names().iter().position(|n| n == name) else { return Ok(None) };
-    let judged = Judged::new(&platform, seed)?;
+    let judged = JudgedScheme::new(&platform, seed)?;
     let degree = judged.verdicts.degrees.degree[column];
     let stairs = stairs(&platform, &judged.verdicts.values);
     let mut explainer = VerdictExplainer {
@@ -71,7 +71,7 @@ pub fn explain(
 /// One unknown of a scheme, with the findings that its explanation uses.
 struct VerdictExplainer<'a> {
     platform: &'a Platform,
-    judged: &'a Judged<'a>,
+    judged: &'a JudgedScheme<'a>,
     found: &'a Analysis,
     stairs: Stairs,
     column: usize,

@@ -18,8 +18,8 @@ use super::witness::{Staircase, WitnessedVerdict};
 use super::{ExactNumber, ExactVector, Exactly, number};
 use crate::degree::coefficient::{Coefficient, Number, power, recover_radical};
 use crate::degree::ensemble::Verdicts;
-use crate::model::platform::{Platform, Sample};
-use crate::model::{Angle, Source};
+use crate::model::platform::{FieldSample, Platform};
+use crate::model::{Angle, ErrorSource};
 
 /// The numbers of an exact certificate.
 pub(super) struct ExactWitness {
@@ -31,7 +31,7 @@ pub(super) struct ExactWitness {
 
 /// Image of a combination in the field of a sample at given rates `(wN, wU)`; powers of a rate that is 0 are
 /// 0.
-pub(super) fn image(c: &Exactly, sample: &Sample, rates: [u64; 2]) -> Vec<(usize, u64)> {
+pub(super) fn image(c: &Exactly, sample: &FieldSample, rates: [u64; 2]) -> Vec<(usize, u64)> {
     let f = &sample.roots.field;
     let value = |c: &Coefficient| match &c.number {
         Number::Radical(radical) => {
@@ -57,7 +57,7 @@ struct StaircasePoints<'a> {
 
 /// Staircase at one point, with the inverses of its minors.
 struct SolvedStaircase {
-    sample: Sample,
+    sample: FieldSample,
     staircase: Staircase,
     inverses: Vec<Vec<Vec<u64>>>,
 }
@@ -73,7 +73,7 @@ pub(super) fn exact(
 ) -> Option<ExactWitness> {
     let scheme = platform.scheme();
     let mut angles = scheme.positions.iter().flat_map(|p| p.angles.iter().map(Angle::turn));
-    let drifts = scheme.unknowns.terms().iter().all(|t| t.source() == Source::Gravity);
+    let drifts = scheme.unknowns.terms().iter().all(|t| t.source() == ErrorSource::Gravity);
     if !drifts || !angles.all(|a| a.is_multiple_of_deg(15)) {
         return None;
     }

@@ -15,11 +15,11 @@ use serde::Serialize;
 use crate::degree::coefficient::{Coefficient, Number};
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::status::Status;
-use crate::findings::{AnalysisError, Judged};
+use crate::findings::{AnalysisError, JudgedScheme};
 use crate::model::angle::format_decimal;
 use crate::model::geometry::GyroAxes;
 use crate::model::path::{PathStep, radical};
-use crate::model::platform::{Platform, Sample};
+use crate::model::platform::{FieldSample, Platform};
 use crate::model::scheme::MAX_COMBINATIONS;
 use crate::model::{Carry, Scheme, Term, Unknowns};
 use crate::solution::Frame;
@@ -213,7 +213,7 @@ pub fn certify(scheme: &Scheme, seed: u64) -> Result<Certificate, CertificateErr
     if found > MOST_UNKNOWNS {
         return Err(not_covered(format!("{found} unknowns"), "at most 300"));
     }
-    let judged = Judged::new(&platform, seed)?;
+    let judged = JudgedScheme::new(&platform, seed)?;
     let combinations = combinations(&platform, &judged);
     let fields = [0, 1].map(|i| {
         let sample = judged.verdicts.values[i].sample(scheme, 1);
@@ -249,7 +249,7 @@ fn check_covered(scheme: &Scheme) -> Result<(), CertificateError> {
 }
 
 /// Combinations that were found or that the scheme requests, where their coefficients are exact.
-fn combinations(platform: &Platform, judged: &Judged<'_>) -> Vec<Exactly> {
+fn combinations(platform: &Platform, judged: &JudgedScheme<'_>) -> Vec<Exactly> {
     let mut solver = judged.solver(Frame::N, None);
     let found = judged.findings(&mut solver).combinations;
     let latitude = platform.scheme().latitude;
@@ -269,7 +269,11 @@ fn combinations(platform: &Platform, judged: &Judged<'_>) -> Vec<Exactly> {
 }
 
 /// All functionals in a field: every unknown, then the combinations.
-fn functionals(platform: &Platform, combinations: &[Exactly], sample: &Sample) -> Vec<Vec<(usize, u64)>> {
+fn functionals(
+    platform: &Platform,
+    combinations: &[Exactly],
+    sample: &FieldSample,
+) -> Vec<Vec<(usize, u64)>> {
     let one = sample.roots.field.one();
     let unknowns = (0..platform.names().len()).map(|c| vec![(c, one)]);
     let images = combinations.iter().map(|c| exact::image(c, sample, [sample.point.w_n, sample.point.w_u]));

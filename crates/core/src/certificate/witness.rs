@@ -5,7 +5,7 @@ use obsdeg_exact::{Echelon, Field};
 
 use super::RowName;
 use crate::degree::status::Status;
-use crate::model::platform::{LOCAL, Platform, Sample, local_dynamics, local_output};
+use crate::model::platform::{FieldSample, LOCAL, Platform, local_dynamics, local_output};
 
 /// Orders 0 to 3 suffice: `F^4 = -(wN^2 + wU^2) F^2`.
 const ORDERS: usize = 4;
@@ -36,7 +36,7 @@ pub(super) struct WitnessedVerdict {
 }
 
 /// All rows of orders 0 to 3, sorted by order, segment, component.
-fn all_rows(platform: &Platform, sample: &Sample) -> Vec<(RowName, Vec<u64>)> {
+fn all_rows(platform: &Platform, sample: &FieldSample) -> Vec<(RowName, Vec<u64>)> {
     let point = &sample.point;
     let field = point.ring;
     let f = local_dynamics(&field, &point.w_n, &point.w_u);
@@ -63,7 +63,7 @@ fn all_rows(platform: &Platform, sample: &Sample) -> Vec<(RowName, Vec<u64>)> {
 
 impl Staircase {
     /// Staircase of the rows of `platform` at `sample`, lowest order first.
-    pub(super) fn new(platform: &Platform, sample: &Sample) -> Self {
+    pub(super) fn new(platform: &Platform, sample: &FieldSample) -> Self {
         Self::of(sample.roots.field, platform.names().len(), all_rows(platform, sample))
     }
 

@@ -28,7 +28,8 @@ use crate::model::Carry;
 use crate::model::attitude::{Matrix3, elementary, product, transpose, unit};
 use crate::model::error_model::Columns;
 use crate::model::platform::{
-    Block, LOCAL, PSI_EPS, Platform, Sample, SteadyTurn, earth_rate_in, local_dynamics, local_output,
+    FieldSample, LOCAL, PSI_EPS, Platform, PositionBlock, SteadyTurn, earth_rate_in, local_dynamics,
+    local_output,
 };
 use crate::model::ring::Ring;
 
@@ -54,7 +55,7 @@ pub(super) fn bits(harmonics: usize) -> f64 {
 }
 
 /// The degrees, and the bases of `V_0, V_1, ...`, at one sample.
-pub(super) fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>) {
+pub(super) fn staircase(platform: &Platform, sample: &FieldSample) -> (Degrees, Vec<Echelon>) {
     let field = sample.point.ring;
     let n = platform.names().len();
     let full = at_a_time(platform, sample);
@@ -108,7 +109,7 @@ struct PsiMotion<E> {
 }
 
 /// Span of the rows at a random time T.
-fn at_a_time(platform: &Platform, sample: &Sample) -> Echelon {
+fn at_a_time(platform: &Platform, sample: &FieldSample) -> Echelon {
     let (field, point) = (sample.point.ring, &sample.point);
     // one seed for all embeddings
     let seed = sample.arcs.iter().flatten().fold(field.modulus(), |seed, arc| seed ^ arc.rate);
@@ -140,7 +141,7 @@ fn at_a_time(platform: &Platform, sample: &Sample) -> Echelon {
 }
 
 /// Frequencies `i j c` of the harmonics j = -m..=m of a rotation; `None` for j = 0.
-fn frequencies(platform: &Platform, sample: &Sample, arc: &SteadyTurn) -> Vec<Option<u64>> {
+fn frequencies(platform: &Platform, sample: &FieldSample, arc: &SteadyTurn) -> Vec<Option<u64>> {
     let (f, m) = (sample.point.ring, platform.errors().harmonics() as i64);
     let unit = f.mul(sample.roots.imaginary_unit(), arc.rate);
     (-m..=m).map(|j| (j != 0).then(|| f.mul(f.from_i64(j), unit))).collect()
@@ -149,7 +150,7 @@ fn frequencies(platform: &Platform, sample: &Sample, arc: &SteadyTurn) -> Vec<Op
 /// Motion of psi in a rotation, as power series in T.
 fn in_series(
     platform: &Platform,
-    sample: &Sample,
+    sample: &FieldSample,
     ring: &SeriesRing,
     arc: &SteadyTurn,
 ) -> PsiMotion<Vec<u64>> {
@@ -181,7 +182,7 @@ fn in_series(
 /// Rows that generate L, in a ring that contains the field and T.
 fn rows<R: LiftField>(
     platform: &Platform,
-    sample: &Sample,
+    sample: &FieldSample,
     ring: &R,
     t: &R::Element,
     mut motion: impl FnMut(&SteadyTurn) -> PsiMotion<R::Element>,
@@ -237,7 +238,7 @@ fn rows<R: LiftField>(
 /// `psi^n` after the turns to a station, with the torquer errors of these.
 fn jumped<R: LiftField>(
     platform: &Platform,
-    sample: &Sample,
+    sample: &FieldSample,
     ring: &R,
     station: usize,
     psi: Columns<R::Element>,
@@ -262,7 +263,7 @@ fn at_rest<R: LiftField>(
     ring: &R,
     psi: &Columns<R::Element>,
     row: [R::Element; LOCAL],
-    block: &Block<u64>,
+    block: &PositionBlock<u64>,
     first: usize,
 ) -> Vec<R::Element> {
     let n = psi[0].len();
@@ -342,7 +343,7 @@ impl Ring for Harmonics<'_> {
 /// Errors along a rotation as trigonometric polynomials of its angle.
 struct RotationErrors<'a> {
     platform: &'a Platform,
-    sample: &'a Sample,
+    sample: &'a FieldSample,
     arc: &'a SteadyTurn,
     /// Drift from torquer errors at the turning rate c, in n: three rows, one column per coefficient.
     turned: Columns<Vec<u64>>,
@@ -353,7 +354,12 @@ struct RotationErrors<'a> {
 }
 
 impl<'a> RotationErrors<'a> {
-    fn new(platform: &'a Platform, sample: &'a Sample, start: &Matrix3<u64>, arc: &'a SteadyTurn) -> Self {
+    fn new(
+        platform: &'a Platform,
+        sample: &'a FieldSample,
+        start: &Matrix3<u64>,
+        arc: &'a SteadyTurn,
+    ) -> Self {
         let (f, point, errors) = (&sample.point.ring, &sample.point, platform.errors());
         let ring = Harmonics { field: f, degree: errors.harmonics() };
         let half = f.from_ratio(1, 2);

@@ -1,15 +1,15 @@
 //! Two random fields in four embeddings each: verdicts must agree in both, and coefficients are recovered
 //! from all.
 
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::{Echelon, PrimeError, gcd};
 
 use super::courses;
 use super::platform_rows::PlatformRows;
 use super::reset::reset_degrees;
 use super::staircase::{Degrees, climb};
-use crate::model::platform::{RandomValues, Sample};
-use crate::model::{Carry, Platform, Source, Unknowns};
+use crate::model::platform::{FieldSample, RandomValues};
+use crate::model::{Carry, ErrorSource, Platform, Unknowns};
 
 /// Number of pairs of fields drawn before a disagreement is an error.
 const ATTEMPTS: usize = 4;
@@ -67,7 +67,7 @@ pub(crate) fn degrees(platform: &Platform, seed: u64) -> Result<Degrees, Ensembl
 fn agreed<T>(
     platform: &Platform,
     seed: u64,
-    climbed: &dyn Fn(&Sample) -> (Degrees, T),
+    climbed: &dyn Fn(&FieldSample) -> (Degrees, T),
 ) -> Result<(Degrees, T, [RandomValues; 2]), EnsembleError> {
     let scheme = platform.scheme();
     for attempt in 0..ATTEMPTS {
@@ -86,7 +86,7 @@ fn agreed<T>(
 }
 
 /// The degrees and the bases of `V_0, V_1, ...` at one sample.
-pub fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>) {
+pub fn staircase(platform: &Platform, sample: &FieldSample) -> (Degrees, Vec<Echelon>) {
     if platform.scheme().by_course() {
         return courses::staircase(platform, sample);
     }
@@ -100,7 +100,7 @@ pub fn staircase(platform: &Platform, sample: &Sample) -> (Degrees, Vec<Echelon>
 /// Size of the claim (see [`obsdeg_exact::certainty`]). A row is a row of `H F^k`, of degree k in the rates,
 /// times `S_i`. Its entries are products of at most six sines and cosines per factor, and of `C_c^n`.
 /// Torqued rates add one degree in the rates; torquer errors of turns add one degree in pi.
-fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
+fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> RankClaim {
     let scheme = platform.scheme();
     let generic = !scheme.generic_names().is_empty();
     let orders = degrees.rank_profile.len();
@@ -108,7 +108,7 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     let factors = scheme.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0).max(2);
     // entries of a row: psi of its position, and the coefficients
     let entries = 3 + platform.coefficients();
-    let torquers = usize::from(scheme.unknowns.have(Source::Rate));
+    let torquers = usize::from(scheme.unknowns.have(ErrorSource::Rate));
     let rotations =
         if scheme.by_course() { scheme.positions.iter().filter(|p| p.rotation.is_some()).count() } else { 0 };
     let harmonics = platform.errors().harmonics();
@@ -116,7 +116,7 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> Claim {
     // an entry is at most 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most
     // sqrt(15) together, with margin
     let bits = 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0;
-    Claim {
+    RankClaim {
         unknowns,
         decisions: orders * (1 + unknowns),
         order,
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use crate::model::Scheme;
 
-    fn claimed(angles: &[[&str; 3]], latitude: Option<&str>) -> Claim {
+    fn claimed(angles: &[[&str; 3]], latitude: Option<&str>) -> RankClaim {
         let angles = angles.iter().map(|a| a.map(|x| x.parse().expect("an angle")));
         let latitude = latitude.map(|l| l.parse().expect("a latitude"));
         let platform = Platform::new(Scheme { latitude, ..Scheme::of_angles(angles) }).expect("a scheme");
@@ -159,10 +159,10 @@ mod tests {
     /// memberships.
     #[test]
     fn what_is_claimed() {
-        let p1_p2 = Claim { unknowns: 15, decisions: 48, order: 24, row_degree: 3, row_bits: 16.0 };
+        let p1_p2 = RankClaim { unknowns: 15, decisions: 48, order: 24, row_degree: 3, row_bits: 16.0 };
         assert_eq!(claimed(&[["0", "0", "0"], ["180", "0", "0"]], None), p1_p2);
         // 10 degrees are a 36th of a turn: with multiples of 15 degrees, 72
-        let finer = Claim { order: 72, ..p1_p2 };
+        let finer = RankClaim { order: 72, ..p1_p2 };
         assert_eq!(claimed(&[["0", "0", "0"], ["180", "10", "0"]], None).order, finer.order);
         // one position: 2 3 4 of 15, so three orders; six sines and cosines of generic angles per factor of g
         let generic = claimed(&[["alpha", "0", "0"]], None);

@@ -4,7 +4,7 @@ use obsdeg_exact::{Echelon, Field};
 
 use super::rows::DerivativeRows;
 use crate::model::platform::{
-    Block, LOCAL, Observed, PSI_EPS, Platform, Sample, local_dynamics, local_output,
+    FieldSample, LOCAL, Observed, PSI_EPS, Platform, PositionBlock, local_dynamics, local_output,
 };
 
 /// A row of the local chain: `Z_component^(order)` as a functional of the local unknowns.
@@ -58,7 +58,7 @@ pub struct PlatformRows {
     field: Field,
     columns: usize,
     chain: Vec<LocalRow>,
-    blocks: Vec<Block<u64>>,
+    blocks: Vec<PositionBlock<u64>>,
     /// True if turns leave torquer errors in psi^n; `None` if the unknowns are the local ones.
     apart: Option<bool>,
     scratch: Vec<u64>,
@@ -66,7 +66,7 @@ pub struct PlatformRows {
 
 impl PlatformRows {
     /// The rows of `platform` at `sample`.
-    pub fn new(platform: &Platform, sample: &Sample) -> Self {
+    pub fn new(platform: &Platform, sample: &FieldSample) -> Self {
         let p = &sample.point;
         Self {
             field: p.ring,

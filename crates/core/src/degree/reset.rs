@@ -6,13 +6,13 @@ use obsdeg_exact::Echelon;
 
 use super::platform_rows::{LocalRow, local_chain};
 use super::staircase::Degrees;
-use crate::model::platform::{Block, LOCAL, Platform, Sample};
+use crate::model::platform::{FieldSample, LOCAL, Platform, PositionBlock};
 
 /// Number of psi components of one position.
 const PSI: usize = 3;
 
 /// Degrees of a scheme under reset carry: the result of [`super::staircase::climb`], at less cost.
-pub(super) fn reset_degrees(platform: &Platform, sample: &Sample) -> Degrees {
+pub(super) fn reset_degrees(platform: &Platform, sample: &FieldSample) -> Degrees {
     let field = sample.point.ring;
     let chain = local_chain(&field, sample.point.w_n, sample.point.w_u, platform.observed());
     let blocks = platform.blocks(&sample.point);
@@ -73,7 +73,7 @@ pub(super) fn reset_degrees(platform: &Platform, sample: &Sample) -> Degrees {
 }
 
 /// Row of the local chain at one station, in the columns of its block.
-fn row(field: &obsdeg_exact::Field, local: &LocalRow, block: &Block<u64>) -> Vec<u64> {
+fn row(field: &obsdeg_exact::Field, local: &LocalRow, block: &PositionBlock<u64>) -> Vec<u64> {
     let entry = |k: usize| {
         let terms = (0..LOCAL).filter(|&i| local.row[i] != 0).map(|i| (local.row[i], block.rows[i][k]));
         field.dot(0, terms)
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
     use crate::degree::ensemble::staircase;
     use crate::model::platform::RandomValues;
-    use crate::model::{Angle, Carry, Rotation, Scheme, Source, Term, Unknowns};
+    use crate::model::{Angle, Carry, ErrorSource, Rotation, Scheme, Term, Unknowns};
     use obsdeg_exact::SplitMix64;
     use proptest::prelude::*;
 
@@ -114,7 +114,7 @@ mod tests {
                 measured_azimuth,
                 ..Scheme::of_angles(angles)
             };
-            let drifts = scheme.unknowns.terms().iter().all(|t| t.source() == Source::Gravity);
+            let drifts = scheme.unknowns.terms().iter().all(|t| t.source() == ErrorSource::Gravity);
             if let Some(p) = turning.filter(|_| drifts).and_then(|i| scheme.positions.get_mut(i)) {
                 p.rotation = Rotation::new("X_p", "120").ok();
             }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use obsdeg_exact::Turn;
+use obsdeg_exact::TurnFraction;
 
 /// Decimals of a degree that are kept exactly.
 pub(crate) const MAX_DECIMALS: usize = 9;
@@ -151,8 +151,8 @@ impl Angle {
     }
 
     /// The constant part, modulo a turn.
-    pub fn turn(&self) -> Turn {
-        Turn::from_nanodeg(self.nanodeg)
+    pub fn turn(&self) -> TurnFraction {
+        TurnFraction::from_nanodeg(self.nanodeg)
     }
 
     /// The generic part: its name, and true for a minus sign.

@@ -3,7 +3,7 @@
 use obsdeg_exact::radical::Ratio;
 use obsdeg_exact::{Field, Radical, SplitMix64};
 
-use super::platform::{RandomValues, Sample};
+use super::platform::{FieldSample, RandomValues};
 use super::symbols::Symbols;
 use super::{Angle, Platform};
 use crate::language::{Environment, Expression, ExpressionError, Node, evaluate, parse};
@@ -41,7 +41,7 @@ pub(crate) fn square_root(n: i32) -> Option<(i64, usize)> {
 struct UnknownValues<'a> {
     names: &'a CombinationNames<'a>,
     values: &'a RandomValues,
-    sample: &'a Sample,
+    sample: &'a FieldSample,
     /// Value of each unknown.
     unknowns: &'a [u64],
     rates: [u64; 2],
@@ -75,7 +75,7 @@ impl Environment for UnknownValues<'_> {
 /// Point at which a combination is evaluated.
 pub(crate) struct EvaluationPoint<'a> {
     pub(crate) values: &'a RandomValues,
-    pub(crate) sample: &'a Sample,
+    pub(crate) sample: &'a FieldSample,
     pub(crate) rates: [u64; 2],
 }
 

@@ -4,7 +4,7 @@
 use super::attitude::{Matrix3, unit};
 use super::geometry::SignedAxis;
 use super::ring::Ring;
-use super::terms::{ErrorTerm, Source};
+use super::terms::{ErrorSource, ErrorTerm};
 
 /// Vector with one column per coefficient.
 pub type Columns<E> = [Vec<E>; 3];
@@ -44,11 +44,11 @@ impl ErrorModel {
         rate: impl FnOnce() -> [R::Element; 3],
     ) -> Columns<R::Element> {
         let g: [R::Element; 3] = std::array::from_fn(|j| ring.neg(&c[1][j]));
-        let rate = self.terms.iter().any(|t| t.source == Source::Rate).then(rate);
-        let of = |source: Source| match source {
-            Source::Gravity => Some(&g),
-            Source::Rate => rate.as_ref(),
-            Source::Force => None,
+        let rate = self.terms.iter().any(|t| t.source == ErrorSource::Rate).then(rate);
+        let of = |source: ErrorSource| match source {
+            ErrorSource::Gravity => Some(&g),
+            ErrorSource::Rate => rate.as_ref(),
+            ErrorSource::Force => None,
         };
         self.rows(ring, c, of)
     }
@@ -57,18 +57,18 @@ impl ErrorModel {
     /// `f = C^T (0,1,0)`: three rows, one column per coefficient.
     pub fn accelerometer_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
         let f = c[1].clone();
-        self.rows(ring, c, |source| (source == Source::Force).then_some(&f))
+        self.rows(ring, c, |source| (source == ErrorSource::Force).then_some(&f))
     }
 
     /// The errors of the accelerometers in c, at the specific force `f`: three rows, one column per
     /// coefficient.
     pub fn accelerometer_columns<R: Ring>(&self, ring: &R, f: &[R::Element; 3]) -> Columns<R::Element> {
-        self.rows(ring, &unit(ring), |source| (source == Source::Force).then_some(f))
+        self.rows(ring, &unit(ring), |source| (source == ErrorSource::Force).then_some(f))
     }
 
     /// `E(u)` of torquer errors in c, for a rate along `u`: three rows, one column per coefficient.
     pub fn torquer_columns<R: Ring>(&self, ring: &R, u: &[R::Element; 3]) -> Columns<R::Element> {
-        self.rows(ring, &unit(ring), |source| (source == Source::Rate).then_some(u))
+        self.rows(ring, &unit(ring), |source| (source == ErrorSource::Rate).then_some(u))
     }
 
     /// Rows in n with one column per coefficient: along the input axis, times the components (3) of the
@@ -77,7 +77,7 @@ impl ErrorModel {
         &self,
         ring: &R,
         c: &Matrix3<R::Element>,
-        of: impl Fn(Source) -> Option<&'a [R::Element; 3]>,
+        of: impl Fn(ErrorSource) -> Option<&'a [R::Element; 3]>,
     ) -> Columns<R::Element>
     where
         R::Element: 'a,

@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::platform::{Platform, Point, local_dynamics, local_output};
+use super::platform::{Platform, PlatformPoint, local_dynamics, local_output};
 use super::ring::Float;
 use super::scheme::{Scheme, SchemeError};
 use super::slew::W_IE;
@@ -76,7 +76,7 @@ pub fn platform_matrices(scheme: &Scheme, earth_rates: [f64; 2]) -> Result<Platf
     let f = local_dynamics(&Float, &w_n, &w_u);
     let output = local_output(&Float, observed);
     let unknowns = platform.names().to_vec();
-    let s = platform.blocks(&Point::in_floats(&platform, w_n, w_u)).into_iter().map(|block| {
+    let s = platform.blocks(&PlatformPoint::in_floats(&platform, w_n, w_u)).into_iter().map(|block| {
         let mut s = DMatrix::zeros(locals, unknowns.len());
         for (r, row) in block.rows.iter().take(locals).enumerate() {
             for (&column, value) in block.columns.iter().zip(row) {

@@ -50,8 +50,8 @@ pub use omitted_names::{SITE_FAMILIES, may_be_omitted, omitted_meant, omitted_un
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{
-    AZIMUTH, Block, Platform, Point, RandomValues, Sample, SteadyTurn, earth_rate_in, local_dynamics,
-    local_output,
+    AZIMUTH, FieldSample, Platform, PlatformPoint, PositionBlock, RandomValues, SteadyTurn, earth_rate_in,
+    local_dynamics, local_output,
 };
 pub use pose::{Pose, SlewTurns};
 pub use position::{Carry, CarryError, Position, PositionError, Station, parse_attitude};
@@ -60,4 +60,4 @@ pub use ring::{Float, Ring, Text};
 pub use rotation::{Axis, AxisError, Rotation, RotationError, SlewAxis, SlewTo};
 pub use scheme::{Latitude, LatitudeError, Scheme, SchemeError};
 pub use symbols::Symbols;
-pub use terms::{DefinedBy, ErrorTerm, FrameError, Source, Term, TermError, Unknowns};
+pub use terms::{DefinedBy, ErrorSource, ErrorTerm, FrameError, Term, TermError, Unknowns};

@@ -18,11 +18,11 @@
 use super::attitude::{Matrix3, product};
 use super::error_model::{Columns, ErrorModel};
 use super::omitted_names::SITE_FAMILIES;
-use super::platform::{Block, LOCAL, PSI_EPS, Platform, Point, earth_rate_in};
+use super::platform::{LOCAL, PSI_EPS, Platform, PlatformPoint, PositionBlock, earth_rate_in};
 use super::position::Carry;
 use super::ring::Ring;
 use super::scheme::Scheme;
-use super::terms::{Source, Term, Unknowns};
+use super::terms::{ErrorSource, Term, Unknowns};
 
 /// Largest number of positions whose attitude errors are treated one by one.
 pub const MAX_ATTITUDES: usize = 64;
@@ -177,7 +177,7 @@ impl OmittedModel {
 
     /// Errors in psi^n (3 x terms) from the turns that lead to station `i`, as in section 10 of the method;
     /// `None` if there is no turn.
-    pub fn turned<R: Ring>(&self, point: &Point<R>, i: usize) -> Option<Columns<R::Element>> {
+    pub fn turned<R: Ring>(&self, point: &PlatformPoint<R>, i: usize) -> Option<Columns<R::Element>> {
         let ring = &point.ring;
         let mut sum: Option<Columns<R::Element>> = None;
         for (from, turn) in point.turns_to(i) {
@@ -198,7 +198,11 @@ impl OmittedModel {
 
     /// `S_i` of every station, with one more column per error after those of the unknowns. `point` has the
     /// turns of [`Self::turning`].
-    pub fn blocks<R: Ring>(&self, platform: &Platform, point: &Point<R>) -> Vec<Block<R::Element>> {
+    pub fn blocks<R: Ring>(
+        &self,
+        platform: &Platform,
+        point: &PlatformPoint<R>,
+    ) -> Vec<PositionBlock<R::Element>> {
         let ring = &point.ring;
         let (n, m) = (platform.names().len(), self.terms.len());
         let mut torqued: Columns<R::Element> = self.columns(ring, |_, _| None);
@@ -228,7 +232,7 @@ impl OmittedModel {
                 }
                 row.into_boxed_slice()
             });
-            Block { columns: block.columns.iter().copied().chain(n..n + m).collect(), rows }
+            PositionBlock { columns: block.columns.iter().copied().chain(n..n + m).collect(), rows }
         });
         extended.collect()
     }
@@ -274,7 +278,7 @@ fn turning_scheme(scheme: &Scheme) -> Option<Scheme> {
     if scheme.carry != Carry::Inertial || scheme.positions.len() < 2 || scheme.rotates() {
         return None;
     }
-    if scheme.unknowns.have(Source::Rate) {
+    if scheme.unknowns.have(ErrorSource::Rate) {
         return Some(scheme.clone());
     }
     let Unknowns::Coefficients(terms) = &scheme.unknowns else { return None };

@@ -32,7 +32,7 @@ pub struct Platform {
 
 /// The platform at one point: cosines and sines of all angles and the earth rate, in a ring.
 #[derive(Debug, Clone)]
-pub struct Point<R: Ring> {
+pub struct PlatformPoint<R: Ring> {
     /// Ring of the numbers.
     pub ring: R,
     /// North component of the earth rate.
@@ -47,7 +47,7 @@ pub struct Point<R: Ring> {
 
 /// `S_i`: the local unknowns of one position as functions of the unknowns of the scheme.
 #[derive(Debug, Clone)]
-pub struct Block<E> {
+pub struct PositionBlock<E> {
     /// Columns (unknowns of the scheme) that occur: psi, then the coefficients.
     pub columns: Vec<usize>,
     /// Rows, one per local unknown, with one entry per column listed; the last three are empty if no
@@ -55,7 +55,7 @@ pub struct Block<E> {
     pub rows: [Box<[E]>; LOCAL],
 }
 
-impl<E: Clone> Block<E> {
+impl<E: Clone> PositionBlock<E> {
     /// Entry of a functional of the local unknowns at the `k`-th column.
     pub fn entry<R: Ring<Element = E>>(&self, ring: &R, row: &[E], k: usize) -> E {
         ring.dot(row.iter().zip(&self.rows).filter_map(|(x, row)| Some((x, row.get(k)?))))
@@ -143,7 +143,7 @@ impl Platform {
 
     /// `S_i` of every station: of every position, and several of a rotation. The psi block depends on the
     /// carry (section 4 of the method); torquer errors add to psi^n in every turn (section 10).
-    pub fn blocks<R: Ring>(&self, point: &Point<R>) -> Vec<Block<R::Element>> {
+    pub fn blocks<R: Ring>(&self, point: &PlatformPoint<R>) -> Vec<PositionBlock<R::Element>> {
         let ring = &point.ring;
         if self.scheme.unknowns == Unknowns::Drift {
             return vec![drift_block(ring)];
@@ -179,7 +179,7 @@ impl Platform {
                 std::array::from_fn(|r| torqued.as_ref().map_or(&nothing, |left| &left[r]).as_slice());
             let psi_first = if self.scheme.carry == Carry::Reset { 3 * station.index } else { 0 };
             let columns = (psi_first..psi_first + 3).chain(first_d..self.names.len()).collect();
-            out.push(Block { columns, rows: self.rows_at(point, c, psi_block, torquers) });
+            out.push(PositionBlock { columns, rows: self.rows_at(point, c, psi_block, torquers) });
         }
         out
     }
@@ -187,7 +187,7 @@ impl Platform {
     /// Sum of the torquer errors in psi^n, with those of the turns to a station.
     fn with_torquer_errors<R: Ring>(
         &self,
-        point: &Point<R>,
+        point: &PlatformPoint<R>,
         station: usize,
         before: Option<Columns<R::Element>>,
     ) -> Option<Columns<R::Element>> {
@@ -213,7 +213,7 @@ impl Platform {
     /// of gyros and accelerometers.
     fn rows_at<R: Ring>(
         &self,
-        point: &Point<R>,
+        point: &PlatformPoint<R>,
         c: &Matrix3<R::Element>,
         psi: &Matrix3<R::Element>,
         torquers: [&[R::Element]; 3],
@@ -240,15 +240,15 @@ impl Platform {
 }
 
 /// Block of a scheme whose unknowns are psi and eps themselves.
-fn drift_block<R: Ring>(ring: &R) -> Block<R::Element> {
+fn drift_block<R: Ring>(ring: &R) -> PositionBlock<R::Element> {
     let rows = std::array::from_fn(|i| match i {
         0..PSI_EPS => (0..PSI_EPS).map(|j| if i == j { ring.one() } else { ring.zero() }).collect(),
         _ => Box::default(),
     });
-    Block { columns: (0..PSI_EPS).collect(), rows }
+    PositionBlock { columns: (0..PSI_EPS).collect(), rows }
 }
 
-impl<R: Ring> Point<R> {
+impl<R: Ring> PlatformPoint<R> {
     /// Turns to a station, each with the attitude at its start.
     #[expect(clippy::type_complexity, reason = "pairs, which would be no plainer under a name")]
     pub fn turns_to(&self, i: usize) -> Vec<(Matrix3<R::Element>, &TurnAt<R::Element>)> {
@@ -332,11 +332,11 @@ pub fn local_output<R: Ring>(ring: &R, observed: Observed) -> Vec<(usize, [R::El
 
 /// The images of a scheme in one random prime field.
 #[derive(Debug, Clone)]
-pub struct Sample {
+pub struct FieldSample {
     /// Field with its root of unity.
     pub roots: RootField,
     /// The platform in the field.
-    pub point: Point<Field>,
+    pub point: PlatformPoint<Field>,
     /// Rotation of every position, if rotations are judged by their output history; empty otherwise.
     pub arcs: Vec<Option<SteadyTurn>>,
 }
@@ -378,7 +378,7 @@ impl RandomValues {
         let paths = scheme.paths().unwrap_or_default();
         let turns = paths.iter().flatten().map(|step| step.angle().turn());
         let angles = stations.iter().flat_map(Station::angles).map(Angle::turn).chain(turns);
-        let latitude = scheme.latitude.map(|l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()));
+        let latitude = scheme.latitude.map(|l| obsdeg_exact::TurnFraction::from_nanodeg(l.nanodeg()));
         let roots = RootField::random(common_order(angles.chain(latitude)), rng)?;
         let p = roots.field.modulus();
         let mut nonzero = || 1 + rng.below(p - 1);
@@ -434,7 +434,7 @@ impl RandomValues {
     }
 
     /// `(cos, sin)` of a generic angle at a sample of these values.
-    pub(crate) fn generic_cos_sin(&self, name: &str, sample: &Sample) -> Option<(u64, u64)> {
+    pub(crate) fn generic_cos_sin(&self, name: &str, sample: &FieldSample) -> Option<(u64, u64)> {
         let z = self.generic.iter().find(|(n, _)| n == name)?.1;
         let f = sample.roots.field;
         // see `sample`: the sine at a fixed tangent must not depend on the sign of the imaginary unit
@@ -448,7 +448,7 @@ impl RandomValues {
         scheme.stations().iter().map(|station| station.attitude(&roots.field, cos_sin)).collect()
     }
 
-    /// Turns to every station ([`Point::turns`]) in a field.
+    /// Turns to every station ([`PlatformPoint::turns`]) in a field.
     ///
     /// # Errors
     /// Index of the first position whose slew path has no image, or does not lead there.
@@ -487,13 +487,13 @@ impl RandomValues {
     }
 
     /// Sample under the embedding `g -> g^a`. Generic angles keep their `tan(angle/2)`.
-    pub fn sample(&self, scheme: &Scheme, a: u64) -> Sample {
+    pub fn sample(&self, scheme: &Scheme, a: u64) -> FieldSample {
         let roots = self.roots.conjugate(a);
         let f = roots.field;
         let (w_n, w_u) = match scheme.latitude {
             None => self.rates,
             Some(latitude) => {
-                let turn = obsdeg_exact::Turn::from_nanodeg(latitude.nanodeg());
+                let turn = obsdeg_exact::TurnFraction::from_nanodeg(latitude.nanodeg());
                 let (c, s) = roots.cos_sin(circle(&roots, turn));
                 (f.mul(self.rates.0, c), f.mul(self.rates.0, s))
             }
@@ -502,18 +502,18 @@ impl RandomValues {
     }
 
     /// Sample under the embedding `g -> g^a`, at other rates `(wN, wU)` of the earth.
-    pub fn sample_at(&self, scheme: &Scheme, a: u64, [w_n, w_u]: [u64; 2]) -> Sample {
+    pub fn sample_at(&self, scheme: &Scheme, a: u64, [w_n, w_u]: [u64; 2]) -> FieldSample {
         let roots = self.roots.conjugate(a);
         let attitudes = self.attitudes(scheme, &roots);
         let paths = scheme.paths().unwrap_or_default();
         let turns = self.turns(scheme, &paths, &roots, &attitudes);
         let turns = turns.expect("the ways of a platform have images in the fields of its angles");
         let arcs = self.arcs(scheme, &roots);
-        Sample { roots, arcs, point: Point { ring: roots.field, w_n, w_u, attitudes, turns } }
+        FieldSample { roots, arcs, point: PlatformPoint { ring: roots.field, w_n, w_u, attitudes, turns } }
     }
 }
 
-/// Turns to every station ([`Point::turns`]) in a ring. `at` gives one turn of a path from the attitude at
+/// Turns to every station ([`PlatformPoint::turns`]) in a ring. `at` gives one turn of a path from the attitude at
 /// its start; if it is the only turn, the attitude at its end is given too. `arrives` is true if a path ends
 /// at the attitude required.
 ///
@@ -549,7 +549,7 @@ fn turns_of<R: Ring>(
     Ok(out)
 }
 
-impl Point<Float> {
+impl PlatformPoint<Float> {
     /// The platform in floating point at the given rates of the earth.
     pub fn in_floats(platform: &Platform, w_n: f64, w_u: f64) -> Self {
         let scheme = platform.scheme();
@@ -564,6 +564,6 @@ impl Point<Float> {
 }
 
 /// Image of `exp(i angle)` for an angle of the scheme of this field.
-fn circle(roots: &RootField, angle: obsdeg_exact::Turn) -> u64 {
+fn circle(roots: &RootField, angle: obsdeg_exact::TurnFraction) -> u64 {
     roots.unit_circle(angle).expect("fields are drawn with the roots of unity of every angle of the scheme")
 }

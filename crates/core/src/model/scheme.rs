@@ -17,7 +17,7 @@ use super::path::{self, Path, PathError, PathStep, StepError};
 pub(crate) use super::position::{Carry, CarryError, Position, Station, parse_attitude};
 use super::recording::Recording;
 use super::rotation::{MIN_ROTATION, Rotation};
-use super::terms::{Source, Term, Unknowns};
+use super::terms::{ErrorSource, Term, Unknowns};
 use crate::model::ranges::{self, RangeError};
 use crate::model::settings;
 use crate::model::settings::Settings;
@@ -278,7 +278,7 @@ const _: () = {
     let mut term = 0;
     while term < Term::ALL.len() {
         assert!(
-            !matches!(Term::ALL[term].source(), Source::Gravity)
+            !matches!(Term::ALL[term].source(), ErrorSource::Gravity)
                 || 2 * (1 + Term::ALL[term].order() as i64) < STATION_STEPS,
             "more steps for a drift of more g factors"
         );
@@ -496,12 +496,12 @@ impl Scheme {
     /// True if rotations are judged by the output history during the turn, not at attitudes of the arc: if
     /// not only drifts are unknown.
     pub fn by_course(&self) -> bool {
-        self.rotates() && (self.unknowns.have(Source::Rate) || self.unknowns.have(Source::Force))
+        self.rotates() && (self.unknowns.have(ErrorSource::Rate) || self.unknowns.have(ErrorSource::Force))
     }
 
     /// Observed quantities.
     pub fn observed(&self) -> Observed {
-        Observed { azimuth: self.measured_azimuth, accelerometers: self.unknowns.have(Source::Force) }
+        Observed { azimuth: self.measured_azimuth, accelerometers: self.unknowns.have(ErrorSource::Force) }
     }
 
     /// Error model of the unknown coefficients.
@@ -541,7 +541,7 @@ impl Scheme {
 
     /// True if verdicts depend on the slew paths: torquer errors act while psi^n is carried.
     pub fn torquers_act(&self) -> bool {
-        self.carry == Carry::Inertial && self.unknowns.have(Source::Rate) && self.positions.len() > 1
+        self.carry == Carry::Inertial && self.unknowns.have(ErrorSource::Rate) && self.positions.len() > 1
     }
 
     /// Turns that lead to every position, if verdicts depend on them; empty otherwise.
@@ -558,7 +558,7 @@ impl Scheme {
             let (name, index) = (to.name.clone(), i + 1);
             let stated = to.slew.is_some() || self.simulation.slew_rate_deg_s.is_some();
             let Some(path) = self.path.or(stated.then_some(Path::OneAxis)) else {
-                let of_rate = self.unknowns.terms().iter().filter(|t| t.source() == Source::Rate);
+                let of_rate = self.unknowns.terms().iter().filter(|t| t.source() == ErrorSource::Rate);
                 let terms = of_rate.map(|t| t.letters()).collect::<Vec<_>>().join(", ");
                 return Err(PathError::NotStated { name, index, terms });
             };

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use crate::language::{Environment, Expression, Node, evaluate, parse};
 use crate::model::angle::{Angle, format_decimal};
-use crate::model::platform::{Platform, Point, RandomValues, Sample};
+use crate::model::platform::{FieldSample, Platform, PlatformPoint, RandomValues};
 use crate::model::ring::{ManyDigits, Real, Ring, Text};
 use crate::model::scheme::Station;
 
@@ -92,10 +92,10 @@ impl Symbols {
     }
 
     /// The platform as text, with rates 1 (or 0): coefficients are homogeneous in the rates.
-    pub fn point(&self, platform: &Platform, w_n: &str, w_u: &str) -> Point<Text> {
+    pub fn point(&self, platform: &Platform, w_n: &str, w_u: &str) -> PlatformPoint<Text> {
         let attitudes =
             platform.scheme().stations().iter().map(|s| s.attitude(&Text, |a| self.cos_sin(a))).collect();
-        Point { ring: Text, w_n: w_n.into(), w_u: w_u.into(), attitudes, turns: Vec::new() }
+        PlatformPoint { ring: Text, w_n: w_n.into(), w_u: w_u.into(), attitudes, turns: Vec::new() }
     }
 
     /// True if the sine and cosine of an angle are among the symbols.
@@ -201,7 +201,7 @@ impl Symbols {
     }
 
     /// Value of a text in the symbols at a sample; `None` if it has none.
-    pub fn value(&self, text: &str, values: &RandomValues, sample: &Sample) -> Option<u64> {
+    pub fn value(&self, text: &str, values: &RandomValues, sample: &FieldSample) -> Option<u64> {
         let env = SymbolValues { symbols: self, values, sample };
         evaluate(&parse(text).ok()?, &sample.roots.field, &env).ok()
     }
@@ -245,7 +245,7 @@ fn octant(angle: &Angle) -> (i64, i64, bool) {
 struct SymbolValues<'a> {
     symbols: &'a Symbols,
     values: &'a RandomValues,
-    sample: &'a Sample,
+    sample: &'a FieldSample,
 }
 
 impl Environment for SymbolValues<'_> {

@@ -51,7 +51,7 @@ pub enum Term {
 
 /// Quantity that an error term depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
+pub enum ErrorSource {
     /// Components of `g^c`, in g; the term is a drift.
     Gravity,
     /// Rate at which the gyro is torqued; the term is a drift.
@@ -68,13 +68,13 @@ pub struct ErrorTerm {
     /// Axes of the components that the coefficient multiplies; none for a constant.
     pub factors: Vec<SignedAxis>,
     /// Quantity whose components these are.
-    pub source: Source,
+    pub source: ErrorSource,
 }
 
 impl ErrorTerm {
     /// Constant drift along the input axis of a gyro.
     pub fn bias(input: SignedAxis) -> Self {
-        Self { input, factors: Vec::new(), source: Source::Gravity }
+        Self { input, factors: Vec::new(), source: ErrorSource::Gravity }
     }
 }
 
@@ -141,11 +141,11 @@ impl Term {
     }
 
     /// Quantity that the term depends on.
-    pub const fn source(self) -> Source {
+    pub const fn source(self) -> ErrorSource {
         match self {
-            Self::GS | Self::GM | Self::GM3 => Source::Rate,
-            Self::K0 | Self::K1 | Self::M6 | Self::M3 | Self::K2 | Self::K3 | Self::Kx => Source::Force,
-            _ => Source::Gravity,
+            Self::GS | Self::GM | Self::GM3 => ErrorSource::Rate,
+            Self::K0 | Self::K1 | Self::M6 | Self::M3 | Self::K2 | Self::K3 | Self::Kx => ErrorSource::Force,
+            _ => ErrorSource::Gravity,
         }
     }
 
@@ -239,7 +239,7 @@ impl Term {
     /// Coefficients of the term, sensor by sensor: names and effects.
     pub(crate) fn coefficients(self, geometry: &Geometry) -> Vec<(String, ErrorTerm)> {
         let inputs = match self.source() {
-            Source::Force => geometry.accelerometers.inputs(),
+            ErrorSource::Force => geometry.accelerometers.inputs(),
             _ => geometry.gyros().map(|g| g.I),
         };
         let mut out = Vec::new();
@@ -253,12 +253,12 @@ impl Term {
                 let factors = match (self, other) {
                     (Self::Kx, Some(j)) => vec![input, inputs[j]],
                     (_, Some(j)) => vec![inputs[j]],
-                    (_, None) if self.source() == Source::Gravity => self.gravity(&geometry.gyros()[i]),
+                    (_, None) if self.source() == ErrorSource::Gravity => self.gravity(&geometry.gyros()[i]),
                     (_, None) => vec![input; self.order()],
                 };
                 let name = match other {
                     Some(j) => format!("{}_{}{}", self.family(), GYROS[i], GYROS[j]),
-                    None if self.source() == Source::Gravity => format!("{}{}", self.family(), GYROS[i]),
+                    None if self.source() == ErrorSource::Gravity => format!("{}{}", self.family(), GYROS[i]),
                     None => format!("{}_{}", self.family(), GYROS[i]),
                 };
                 out.push((name, ErrorTerm { input, factors, source: self.source() }));
@@ -469,7 +469,7 @@ impl Unknowns {
     }
 
     /// True if the unknowns have a term with this source.
-    pub fn have(&self, source: Source) -> bool {
+    pub fn have(&self, source: ErrorSource) -> bool {
         self.terms().iter().any(|t| t.source() == source)
     }
 }

@@ -10,7 +10,7 @@ use super::solver::Solver;
 use super::turning::drift_derivative;
 use crate::model::platform::{AZIMUTH, LOCAL_NAMES, PSI_EPS, local_output};
 use crate::model::ring::{Ring, Text};
-use crate::model::{Platform, Source};
+use crate::model::{ErrorSource, Platform};
 
 /// Formula of Z or of one of its derivatives.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
@@ -46,7 +46,7 @@ pub(crate) enum FormulasError {
 /// # Errors
 /// [`FormulasError`].
 pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<Vec<Formula>, FormulasError> {
-    if platform.scheme().unknowns.have(Source::Rate) {
+    if platform.scheme().unknowns.have(ErrorSource::Rate) {
         return Err(FormulasError::Torquers);
     }
     if platform.scheme().by_course() {

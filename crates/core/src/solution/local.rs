@@ -2,7 +2,7 @@
 
 use crate::degree::coefficient::Rates;
 use crate::model::Platform;
-use crate::model::platform::{AZIMUTH, Block, LOCAL, Observed, Point};
+use crate::model::platform::{AZIMUTH, LOCAL, Observed, PlatformPoint, PositionBlock};
 use crate::model::ring::Ring;
 
 /// Term `sign * wN^a wU^b * Z_component^(order)`, Z in n.
@@ -146,7 +146,7 @@ fn without_zeros(mut out: Vec<LocalObservable>, zeros: RateZeros) -> Vec<LocalOb
 /// Rows of `observables` at every position of `platform`, at `point`.
 pub(crate) fn rows_at<R: Ring>(
     platform: &Platform,
-    point: &Point<R>,
+    point: &PlatformPoint<R>,
     observables: &[LocalObservable],
 ) -> Vec<Vec<R::Element>> {
     let ring = &point.ring;
@@ -155,7 +155,7 @@ pub(crate) fn rows_at<R: Ring>(
             |base: &R::Element, e: i32| (0..e).fold(ring.one(), |product, _| ring.mul(&product, base));
         ring.mul(&factor(&point.w_n, rates[0]), &factor(&point.w_u, rates[1]))
     };
-    let row = |block: &Block<R::Element>, o: &LocalObservable| {
+    let row = |block: &PositionBlock<R::Element>, o: &LocalObservable| {
         let mut out: Vec<R::Element> = platform.names().iter().map(|_| ring.zero()).collect();
         for &(index, sign, rates) in &o.row {
             debug_assert!(index < LOCAL);

@@ -16,7 +16,7 @@ use crate::degree::staircase::Degrees;
 use crate::degree::status::{Difference, Verdict};
 use crate::language::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 use crate::model::Platform;
-use crate::model::platform::{Point, RandomValues};
+use crate::model::platform::{PlatformPoint, RandomValues};
 use crate::model::ring::{Ring, Text};
 use crate::model::scheme::Station;
 
@@ -280,7 +280,7 @@ fn candidate_requests(
     out
 }
 
-fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> Point<Text> {
+fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> PlatformPoint<Text> {
     let rate = |zero: bool| if zero { Text.zero() } else { Text.one() };
     let quarter =
         [("1", "0"), ("0", "1"), ("-1", "0"), ("0", "-1")].map(|(c, s)| (c.to_string(), s.to_string()));
@@ -292,7 +292,7 @@ fn half_tangent_point(platform: &Platform, solver: &Solver<'_>) -> Point<Text> {
         let cos = Text.add(&Text.mul(&c, a), &Text.neg(&Text.mul(&s, b)));
         (cos, Text.add(&Text.mul(&s, a), &Text.mul(&c, b)))
     };
-    Point {
+    PlatformPoint {
         ring: Text,
         w_n: rate(solver.tables.zeros.w_n),
         w_u: rate(solver.tables.zeros.w_u),

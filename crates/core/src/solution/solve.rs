@@ -10,10 +10,10 @@ use super::problem::{LinearSystem, TurningCorrection};
 use super::solver::{Frame, Functional, MAX_SYMBOLIC_ANGLES, PRINTABLE, Solver, float_point, tidy};
 use super::substitution::{Substitution, binomial};
 use super::support::short_support;
-use super::term::Term;
+use super::term::SolutionTerm;
 use super::turning::attitude_derivative;
 use crate::degree::coefficient::{Coefficient, Form, Number, READABLE, Rates, power, readable};
-use crate::model::platform::{AZIMUTH, Point};
+use crate::model::platform::{AZIMUTH, PlatformPoint};
 use crate::model::ring::Ring;
 
 /// Values of `(wN, wU)` and of every rate of turning at which decimals are checked.
@@ -51,7 +51,7 @@ pub enum Verification {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
     /// Terms, sorted by power of the turning rate, order, component and station.
-    pub terms: Vec<Term>,
+    pub terms: Vec<SolutionTerm>,
     /// Source of the coefficients.
     pub found_by: FoundBy,
     /// Check that the solution passed.
@@ -143,7 +143,7 @@ impl Solver<'_> {
     /// True if the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is
     /// replaced by its row, at rest or turning, in all tables; terms with decimals are summed in floating
     /// point.
-    fn holds(&self, terms: &[Term], functional: &Functional, targets: &[Vec<u64>]) -> bool {
+    fn holds(&self, terms: &[SolutionTerm], functional: &Functional, targets: &[Vec<u64>]) -> bool {
         if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {
             return self.holds_in_floats(terms, functional).unwrap_or(false);
         }
@@ -151,7 +151,7 @@ impl Solver<'_> {
             let f = table.sample.roots.field;
             // every position has its own turning rate
             let turning = |i: usize| f.from_u64(SplitMix64::new(f.modulus() ^ i as u64).next_u64());
-            let coefficient = |t: &Term| {
+            let coefficient = |t: &SolutionTerm| {
                 let image = self.image(&t.coefficient, field, table)?;
                 Some(f.mul(image, f.pow(turning(self.stations[t.station].0), t.turns as u64)))
             };
@@ -163,11 +163,11 @@ impl Solver<'_> {
 
     /// True if the terms sum up to the functional in floating point at other rates; `None` for generic
     /// angles.
-    fn holds_in_floats(&self, terms: &[Term], functional: &Functional) -> Option<bool> {
+    fn holds_in_floats(&self, terms: &[SolutionTerm], functional: &Functional) -> Option<bool> {
         let (w_n, w_u, turning) = OTHER_RATES;
         let point = float_point(self.platform, &self.tables, (w_n, w_u));
         let number = |c: &Coefficient| Some(self.number(c)? * w_n.powi(c.rates[0]) * w_u.powi(c.rates[1]));
-        let coefficient = |t: &Term| Some(number(&t.coefficient)? * turning.powi(t.turns as i32));
+        let coefficient = |t: &SolutionTerm| Some(number(&t.coefficient)? * turning.powi(t.turns as i32));
         let coefficients: Vec<f64> = terms.iter().map(coefficient).collect::<Option<_>>()?;
         let mut rest =
             Substitution::new(self.platform, &point, self.frame).sum(terms, &coefficients, |_| turning);
@@ -187,10 +187,10 @@ impl Solver<'_> {
         let system = self.row_system(&targets, degree)?;
         let plan = self.plan(&system.used);
         let (numbers, found_by, verification) = self.numbers(functional, &system, &plan)?;
-        let mut terms: Vec<Term> = plan
+        let mut terms: Vec<SolutionTerm> = plan
             .iter()
             .zip(numbers)
-            .map(|((key, _), number)| Term {
+            .map(|((key, _), number)| SolutionTerm {
                 station: key.station,
                 component: key.component,
                 azimuth: key.azimuth,
@@ -377,7 +377,7 @@ impl Solver<'_> {
     /// Numbers `sum factor * x_j * (axis factor)` of all printed terms.
     fn term_numbers<R: Ring>(
         &self,
-        point: &Point<R>,
+        point: &PlatformPoint<R>,
         plan: &[(TermKey, Vec<Contribution>)],
         x: &[R::Element],
     ) -> Vec<R::Element> {
@@ -392,7 +392,12 @@ impl Solver<'_> {
     }
 
     /// Factor of the amount of a row in a printed term.
-    pub(super) fn weight<R: Ring>(&self, point: &Point<R>, key: &TermKey, c: &Contribution) -> R::Element {
+    pub(super) fn weight<R: Ring>(
+        &self,
+        point: &PlatformPoint<R>,
+        key: &TermKey,
+        c: &Contribution,
+    ) -> R::Element {
         let ring = &point.ring;
         let axis = match (self.frame, self.stations[key.station].1) {
             (Frame::Platform, Some(axis)) if !key.azimuth => {

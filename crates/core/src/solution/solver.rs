@@ -15,13 +15,13 @@ use crate::degree::coefficient::{
 };
 use crate::degree::ensemble::Verdicts;
 use crate::model::angle::Angle;
-use crate::model::platform::{Platform, Point};
+use crate::model::platform::{Platform, PlatformPoint};
 use crate::model::ring::{Float, ManyDigits, Real, Text};
 use crate::model::rotation::Axis;
 use crate::model::symbols::Symbols;
-use crate::model::terms::Source;
+use crate::model::terms::ErrorSource;
 use crate::solution::local::rows_at;
-use crate::solution::tables::{Table, Tables};
+use crate::solution::tables::{RowTable, Tables};
 
 /// Largest number of angles with symbols of their own for which formulas are attempted.
 pub(super) const MAX_SYMBOLIC_ANGLES: usize = 4;
@@ -61,8 +61,8 @@ pub struct Solver<'a> {
     pub(crate) tables: Tables,
     pub(super) symbols: Symbols,
     pub(super) text: Vec<Vec<String>>,
-    pub(super) text_point: Point<Text>,
-    pub(super) floats: Option<(Point<Float>, Vec<Vec<f64>>)>,
+    pub(super) text_point: PlatformPoint<Text>,
+    pub(super) floats: Option<(PlatformPoint<Float>, Vec<Vec<f64>>)>,
     many_digits: OnceCell<Option<Vec<Vec<Real>>>>,
     pub(super) worker: Option<&'a mut Worker>,
     pub(super) frame: Frame,
@@ -86,7 +86,7 @@ impl<'a> Solver<'a> {
         let rate = |zero: bool| if zero { "0" } else { "1" };
         let text_point = symbols.point(platform, rate(tables.zeros.w_n), rate(tables.zeros.w_u));
         // turns of torquer errors contain pi, and their drift sums of rates: neither is among the symbols
-        let torquers = platform.scheme().unknowns.have(Source::Rate);
+        let torquers = platform.scheme().unknowns.have(ErrorSource::Rate);
         let others = torquers || platform.scheme().by_course();
         let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES && !others;
         let mut text = Vec::new();
@@ -147,7 +147,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Image of a coefficient; `None` for a decimal.
-    pub(super) fn image(&self, c: &Coefficient, field: usize, table: &Table) -> Option<u64> {
+    pub(super) fn image(&self, c: &Coefficient, field: usize, table: &RowTable) -> Option<u64> {
         let k = &table.sample.roots;
         let number = match &c.number {
             Number::Radical(r) => r.image(k),
@@ -161,7 +161,7 @@ impl<'a> Solver<'a> {
 
     /// Functional with the given exact coefficients; `None` if one of them is a decimal.
     pub(crate) fn functional(&self, terms: Sparse) -> Option<Functional> {
-        let images = |(field, table): (usize, &Table)| {
+        let images = |(field, table): (usize, &RowTable)| {
             terms.iter().map(|(_, c)| self.image(c, field, table)).collect::<Option<Vec<u64>>>()
         };
         let images = self.all_tables().map(images).collect::<Option<_>>()?;
@@ -188,7 +188,7 @@ impl<'a> Solver<'a> {
         let terms = columns.into_iter().zip(split).map(|(c, (rates, numbers))| {
             let number = match self.recover(&numbers) {
                 Some(radical) => Number::Radical(radical),
-                None if self.platform.scheme().unknowns.have(Source::Rate) => return None,
+                None if self.platform.scheme().unknowns.have(ErrorSource::Rate) => return None,
                 None => {
                     let rows = text.get_or_insert_with(|| {
                         rows_at(self.platform, &self.text_point, &self.tables.observables)
@@ -211,12 +211,12 @@ impl<'a> Solver<'a> {
     }
 
     /// Tables of both fields, embedding by embedding, with the index of the field.
-    pub(super) fn tables_at_the_rates(&self) -> impl Iterator<Item = (usize, &Table)> {
+    pub(super) fn tables_at_the_rates(&self) -> impl Iterator<Item = (usize, &RowTable)> {
         self.tables.tables.iter().enumerate().flat_map(|(i, four)| four.iter().map(move |t| (i, t)))
     }
 
     /// Tables of both fields with the index of the field, then the table at other rates.
-    pub(super) fn all_tables(&self) -> impl Iterator<Item = (usize, &Table)> {
+    pub(super) fn all_tables(&self) -> impl Iterator<Item = (usize, &RowTable)> {
         self.tables_at_the_rates().chain([(0, &self.tables.other_rates)])
     }
 
@@ -263,7 +263,7 @@ impl<'a> Solver<'a> {
         &mut self,
         problem: &LinearSystem,
     ) -> Option<(Vec<Coefficient>, Vec<Vec<u64>>)> {
-        let solve = |(_, t): (usize, &Table)| problem.solve_in_field(&t.sample.roots.field, &t.rows, &[]);
+        let solve = |(_, t): (usize, &RowTable)| problem.solve_in_field(&t.sample.roots.field, &t.rows, &[]);
         let values: Vec<Vec<u64>> = self.all_tables().map(solve).collect::<Option<_>>()?;
         let split = self.split_rates(&values)?;
         let numbers = self.output_numbers(problem, &split)?;
@@ -300,11 +300,11 @@ impl<'a> Solver<'a> {
     fn many_digits(&self) -> Option<&Vec<Vec<Real>>> {
         let rows = self.many_digits.get_or_init(|| {
             let scheme = self.platform.scheme();
-            self.floats.as_ref().filter(|_| !scheme.unknowns.have(Source::Rate))?;
+            self.floats.as_ref().filter(|_| !scheme.unknowns.have(ErrorSource::Rate))?;
             let known =
                 |a: &Angle| ManyDigits::cos_sin(a.turn().nanodeg()).unwrap_or((Real::ZERO, Real::ZERO));
             let rate = |zero: bool| if zero { Real::ZERO } else { Real::from_i64(1) };
-            let point = Point {
+            let point = PlatformPoint {
                 ring: ManyDigits,
                 w_n: rate(self.tables.zeros.w_n),
                 w_u: rate(self.tables.zeros.w_u),
@@ -321,10 +321,10 @@ impl<'a> Solver<'a> {
     }
 }
 
-pub(super) fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> Point<Float> {
+pub(super) fn float_point(platform: &Platform, tables: &Tables, rates: (f64, f64)) -> PlatformPoint<Float> {
     let rate = |zero: bool, w: f64| if zero { 0.0 } else { w };
     let (w_n, w_u) = (rate(tables.zeros.w_n, rates.0), rate(tables.zeros.w_u, rates.1));
-    Point::in_floats(platform, w_n, w_u)
+    PlatformPoint::in_floats(platform, w_n, w_u)
 }
 
 /// The number, or zero if it is rounding.

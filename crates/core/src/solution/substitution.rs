@@ -1,11 +1,13 @@
 //! Substitution of the derivatives of Z in printed terms: their sum as a functional of the unknowns.
 
 use super::solver::Frame;
-use super::term::Term;
+use super::term::SolutionTerm;
 use super::turning::{attitude_derivative, drift_derivative};
 use crate::model::Platform;
 use crate::model::attitude::Matrix3;
-use crate::model::platform::{AZIMUTH, Block, LOCAL, PSI_EPS, Point, local_dynamics, local_output};
+use crate::model::platform::{
+    AZIMUTH, LOCAL, PSI_EPS, PlatformPoint, PositionBlock, local_dynamics, local_output,
+};
 use crate::model::ring::Ring;
 use crate::model::scheme::Station;
 
@@ -15,17 +17,17 @@ const MOVING: usize = LOCAL + 3;
 /// The platform at one point, ready for substitution.
 pub(super) struct Substitution<'a, R: Ring> {
     platform: &'a Platform,
-    point: &'a Point<R>,
+    point: &'a PlatformPoint<R>,
     frame: Frame,
     stations: Vec<Station<'a>>,
-    blocks: Vec<Block<R::Element>>,
+    blocks: Vec<PositionBlock<R::Element>>,
     /// `H` by component, and `F` with `eps' = eps^n'`.
     output: Vec<(usize, [R::Element; MOVING])>,
     dynamics: [[R::Element; MOVING]; MOVING],
 }
 
 impl<'a, R: Ring> Substitution<'a, R> {
-    pub(super) fn new(platform: &'a Platform, point: &'a Point<R>, frame: Frame) -> Self {
+    pub(super) fn new(platform: &'a Platform, point: &'a PlatformPoint<R>, frame: Frame) -> Self {
         let ring = &point.ring;
         let wide = |row: [R::Element; LOCAL]| -> [R::Element; MOVING] {
             let mut row = row.into_iter();
@@ -53,7 +55,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
     /// of turning; `turning` is the turning rate at a position.
     pub(super) fn sum(
         &self,
-        terms: &[Term],
+        terms: &[SolutionTerm],
         coefficients: &[R::Element],
         turning: impl Fn(usize) -> R::Element,
     ) -> Vec<R::Element> {
@@ -81,7 +83,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
     }
 
     /// Derivative of Z that a term names, as a functional of the local unknowns and `eps^n'`.
-    fn derivative(&self, term: &Term, rate: &R::Element) -> [R::Element; MOVING] {
+    fn derivative(&self, term: &SolutionTerm, rate: &R::Element) -> [R::Element; MOVING] {
         let ring = &self.point.ring;
         // Z^n^(k) as measured
         let in_n = |component: usize, order: usize| {

@@ -8,20 +8,20 @@ use super::local::{LocalObservable, RateZeros, local_observables, rows_at};
 use super::turning::motion_rows;
 use crate::degree::ensemble::{Verdicts, staircase};
 use crate::model::Platform;
-use crate::model::platform::{RandomValues, Sample};
+use crate::model::platform::{FieldSample, RandomValues};
 
 /// Rows of the local observables of every position, in one field and embedding.
 #[derive(Debug, Clone)]
-pub(crate) struct Table {
+pub(crate) struct RowTable {
     /// Field and embedding.
-    pub sample: Sample,
+    pub sample: FieldSample,
     /// Rows, one per station and local observable, station by station; then, if the scheme rotates, one per
     /// station of [`motion_rows`]. If rotations are judged by their output history, the bases of
     /// `V_0, V_1, ...` instead.
     pub rows: Vec<Vec<u64>>,
 }
 
-impl Table {
+impl RowTable {
     /// Rates `(wN, wU)` of the table.
     pub(crate) fn rates(&self) -> [u64; 2] {
         [self.sample.point.w_n, self.sample.point.w_u]
@@ -41,9 +41,9 @@ pub(crate) struct Tables {
     /// Components of the earth rate that are zero.
     pub zeros: RateZeros,
     /// Tables `[field][embedding]`.
-    pub tables: [[Table; 4]; 2],
+    pub tables: [[RowTable; 4]; 2],
     /// Table of the first field and embedding at other rates.
-    pub other_rates: Table,
+    pub other_rates: RowTable,
 }
 
 impl Tables {
@@ -63,11 +63,11 @@ impl Tables {
             if scheme.by_course() {
                 let stairs = staircase(platform, &sample).1;
                 let rows = stairs.iter().flat_map(|basis| (0..basis.rank()).map(|i| basis.row(i).to_vec()));
-                return Table { rows: rows.collect(), sample };
+                return RowTable { rows: rows.collect(), sample };
             }
             let mut rows = rows_at(platform, &sample.point, &observables);
             rows.extend(motion_rows(platform, &sample.point));
-            Table { sample, rows }
+            RowTable { sample, rows }
         };
         // the rates of the verdicts, so that vectors of the stairs are vectors of the first table
         let tables = [0, 1].map(|i| {
@@ -114,7 +114,7 @@ impl Tables {
     }
 
     /// Table of the first field and embedding.
-    pub(crate) fn first(&self) -> &Table {
+    pub(crate) fn first(&self) -> &RowTable {
         &self.tables[0][0]
     }
 }

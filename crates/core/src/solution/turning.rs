@@ -7,15 +7,15 @@
 
 use crate::model::Platform;
 use crate::model::attitude::{Matrix3, product};
-use crate::model::platform::Point;
+use crate::model::platform::PlatformPoint;
 use crate::model::ring::Ring;
 use crate::model::rotation::Axis;
 
 /// Ring of dual numbers `a + b d` with `d^2 = 0`: a value and its derivative.
 #[derive(Debug, Clone, Copy)]
-struct Dual<'a, R>(&'a R);
+struct DualNumbers<'a, R>(&'a R);
 
-impl<R: Ring> Ring for Dual<'_, R> {
+impl<R: Ring> Ring for DualNumbers<'_, R> {
     type Element = [R::Element; 2];
     fn zero(&self) -> Self::Element {
         [self.0.zero(), self.0.zero()]
@@ -65,14 +65,15 @@ pub(crate) fn drift_derivative<R: Ring>(
     let slope = attitude_derivative(ring, c, axis, 1);
     let both: Matrix3<[R::Element; 2]> =
         std::array::from_fn(|i| std::array::from_fn(|j| [c[i][j].clone(), slope[i][j].clone()]));
-    let rows =
-        platform.errors().drift_rows(&Dual(ring), &both, || std::array::from_fn(|_| Dual(ring).zero()));
+    let rows = platform
+        .errors()
+        .drift_rows(&DualNumbers(ring), &both, || std::array::from_fn(|_| DualNumbers(ring).zero()));
     rows.map(|row| row.into_iter().map(|[_, slope]| slope).collect())
 }
 
 /// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform is at
 /// rest. `Z1''` is the only second derivative that solutions use (16).
-pub(crate) fn motion_rows<R: Ring>(platform: &Platform, point: &Point<R>) -> Vec<Vec<R::Element>> {
+pub(crate) fn motion_rows<R: Ring>(platform: &Platform, point: &PlatformPoint<R>) -> Vec<Vec<R::Element>> {
     if !platform.scheme().rotates() || platform.scheme().by_course() {
         return Vec::new();
     }

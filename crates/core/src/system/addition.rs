@@ -26,7 +26,7 @@ type Polynomial = BTreeMap<Monomial, Ratio>;
 
 /// An argument as a combination of kept arguments.
 #[derive(Debug, Clone)]
-struct Parts {
+struct ArgumentParts {
     /// Kept arguments with their multiples: `(index, multiple)`.
     of: Vec<(usize, i64)>,
     /// Number of quarter turns that are added.
@@ -39,7 +39,7 @@ struct ArgumentFamily {
     /// Kept arguments: node, number of quarter turns, and divisor.
     kept: Vec<(usize, i64, i64)>,
     /// Combination of kept arguments by the node of an argument.
-    parts: HashMap<usize, Parts>,
+    parts: HashMap<usize, ArgumentParts>,
 }
 
 /// The system with every function of a sum or a multiple of other arguments written by functions of these;
@@ -131,7 +131,7 @@ fn family(dag: &Dag, real: bool) -> ArgumentFamily {
     for (of, quarters, made) in found {
         let times = |(k, ratio): (usize, &Ratio)| (k, ratio.0 * (out.kept[k].2 / ratio.1));
         let of_parts = made.iter().enumerate().map(times).filter(|(_, n)| *n != 0).collect();
-        out.parts.insert(of, Parts { of: of_parts, quarters });
+        out.parts.insert(of, ArgumentParts { of: of_parts, quarters });
     }
     out
 }
@@ -221,7 +221,13 @@ fn product(left: &Polynomial, right: &Polynomial) -> Option<Polynomial> {
 
 impl ArgumentFamily {
     /// Node of a function written by functions of the kept arguments; `None` if a power is large.
-    fn write(&self, dag: &mut Dag, nodes: &[usize], function: Function, parts: &Parts) -> Option<usize> {
+    fn write(
+        &self,
+        dag: &mut Dag,
+        nodes: &[usize],
+        function: Function,
+        parts: &ArgumentParts,
+    ) -> Option<usize> {
         if let ([(k, 1)], 0) = (&parts.of[..], parts.quarters)
             && let (node, 0, 1) = self.kept[*k]
         {

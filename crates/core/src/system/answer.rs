@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::branches::{BranchSide, branches};
 use super::constraints::ConstraintFactor;
-use super::counts::{Count, Limits, Solutions, values_taken};
+use super::counts::{Count, CountLimits, Solutions, values_taken};
 use super::error::ModelError;
 use super::functions::gcd;
 use super::identifiable::{identifiable_functions, terms_of};
@@ -341,7 +341,7 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
     if !options.solutions {
         return Ok(out);
     }
-    let limits = Limits {
+    let limits = CountLimits {
         count: options.count_limit.saturating_mul(1_000_000),
         relations: options.relation_limit.saturating_mul(1_000_000),
     };

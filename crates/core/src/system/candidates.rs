@@ -6,7 +6,7 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::error::ModelError;
-use super::model::{Candidate, MAX_EXPERIMENTS, Named, Place, PlacedExpression, SystemModel};
+use super::model::{Candidate, FilePlace, MAX_EXPERIMENTS, Named, PlacedExpression, SystemModel};
 use super::reader::{Entry, ModelReader, base};
 use crate::language::{Expression, Node, Shape, Shapes, nearest, parse_components};
 
@@ -122,7 +122,7 @@ impl SystemModel {
                 return Err(wrong(text, &format!("`{text}` is not known here; did you mean `{word}`?")));
             }
         }
-        let place = Place { what: format!("the candidate {text}"), offset: None };
+        let place = FilePlace { what: format!("the candidate {text}"), offset: None };
         let expanded = self.with_outputs(text);
         let read = parse_components(&expanded, &self.shapes()).map_err(|e| ModelError {
             what: place.what.clone(),
@@ -280,7 +280,7 @@ fn named(of: &Named) -> Candidate {
         nodes: vec![Node::Name(of.name.clone())],
         spans: std::iter::once(0..of.name.len()).collect(),
     };
-    let place = Place { what: format!("the candidate {}", of.name), offset: None };
+    let place = FilePlace { what: format!("the candidate {}", of.name), offset: None };
     one(of.clone(), PlacedExpression { text: of.name.clone(), expression, place })
 }
 

@@ -7,8 +7,8 @@ use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
 use super::error::ModelError;
 use super::model::{
-    Compiled, CompiledExperiment, CompiledSegment, KnownInput, MAX_NODES, Place, PlacedExpression, Role,
-    Segment, StateStart, SystemModel,
+    Compiled, CompiledExperiment, CompiledSegment, FilePlace, KnownInput, MAX_NODES, ModelSegment,
+    PlacedExpression, Role, StateStart, SystemModel,
 };
 use crate::language::{among, nearest};
 
@@ -54,7 +54,7 @@ struct Compiler<'m> {
     /// Nodes of known constants.
     constants: Names,
     /// Place at which each node was written first.
-    places: HashMap<usize, (Place, Range<usize>)>,
+    places: HashMap<usize, (FilePlace, Range<usize>)>,
 }
 
 impl<'m> Compiler<'m> {
@@ -246,7 +246,7 @@ impl<'m> Compiler<'m> {
 
     fn segment(
         &mut self,
-        segment: &Segment,
+        segment: &ModelSegment,
         names: &Names,
         start_names: &Names,
     ) -> Result<CompiledSegment, ModelError> {

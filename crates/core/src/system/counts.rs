@@ -27,7 +27,7 @@ pub(super) type Count = Result<usize, NotCounted>;
 
 /// Limits of work, in products of two coefficients at each of two points.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limits {
+pub(super) struct CountLimits {
     /// Limit for counting solutions of the equations in the unknowns.
     pub(super) count: u64,
     /// Limit for relations among derivatives of the outputs, and for a second count if the first leaves
@@ -62,14 +62,14 @@ struct Counting<'a> {
 
 /// Stage of counting: the equations that it uses.
 #[derive(Clone, Copy)]
-struct Stage {
+struct CountStage {
     others: usize,
     limit: u64,
     /// True if functions and all unknowns are counted, not only observable unknowns.
     whole: bool,
 }
 
-impl Stage {
+impl CountStage {
     fn new(others: usize, limit: u64) -> Self {
         Self { others, limit, whole: false }
     }
@@ -82,7 +82,7 @@ impl Counting<'_> {
     }
 
     /// Solutions in a field, given known consequences of relations.
-    fn fibre(&self, i: usize, stage: Stage, known: &RelationConsequences) -> Result<Fibre, NotCounted> {
+    fn fibre(&self, i: usize, stage: CountStage, known: &RelationConsequences) -> Result<Fibre, NotCounted> {
         let Self { model, compiled, judged, order, .. } = *self;
         if judged.findings.degrees.degree.len() > UNKNOWNS {
             return Err(NotCounted::TooLarge);
@@ -144,7 +144,7 @@ impl Counting<'_> {
     }
 
     /// Solutions in both fields; in the second only if the first decides a number.
-    fn both(&self, stage: Stage, known: [&RelationConsequences; 2]) -> [Result<Fibre, NotCounted>; 2] {
+    fn both(&self, stage: CountStage, known: [&RelationConsequences; 2]) -> [Result<Fibre, NotCounted>; 2] {
         let first = self.fibre(0, stage, known[0]);
         let second = match &first {
             Ok(fibre) if fibre.polynomials.iter().any(Result::is_ok) => self.fibre(1, stage, known[1]),
@@ -237,12 +237,12 @@ impl Counting<'_> {
 
 impl Counting<'_> {
     /// Numbers of solutions, stage by stage, as far as the limits allow.
-    fn by_stages(&self, limits: Limits) -> Vec<Count> {
+    fn by_stages(&self, limits: CountLimits) -> Vec<Count> {
         let nothing = RelationConsequences::default();
-        let mut counts = self.agreed(&self.both(Stage::new(0, limits.count), [&nothing; 2]));
+        let mut counts = self.agreed(&self.both(CountStage::new(0, limits.count), [&nothing; 2]));
         let others = self.others();
         if self.is_open(&counts) && others > 0 {
-            self.again(&mut counts, Stage::new(others, limits.count), [&nothing; 2]);
+            self.again(&mut counts, CountStage::new(others, limits.count), [&nothing; 2]);
         }
         if !self.is_open(&counts) || limits.relations == 0 || !self.compiled.dag.is_rational() {
             return counts;
@@ -250,11 +250,11 @@ impl Counting<'_> {
         if global::applies(self.model, self.compiled, self.judged)
             && let Some([first, second]) = self.by_relations(limits.relations)
         {
-            self.again(&mut counts, Stage::new(others, limits.count), [&first, &second]);
+            self.again(&mut counts, CountStage::new(others, limits.count), [&first, &second]);
         }
         for others in if others > 0 { vec![0, others] } else { vec![0] } {
             if self.is_open(&counts) && limits.relations > limits.count {
-                self.again(&mut counts, Stage::new(others, limits.relations), [&nothing; 2]);
+                self.again(&mut counts, CountStage::new(others, limits.relations), [&nothing; 2]);
             }
         }
         counts
@@ -268,7 +268,7 @@ impl Counting<'_> {
     }
 
     /// Counts again, and fills in numbers that were not decided before.
-    fn again(&self, counts: &mut [Count], stage: Stage, known: [&RelationConsequences; 2]) {
+    fn again(&self, counts: &mut [Count], stage: CountStage, known: [&RelationConsequences; 2]) {
         let mut new = self.agreed(&self.both(stage, known));
         let unique = known[0].unique.iter().filter(|l| known[1].unique.contains(l));
         unique.for_each(|&lane| new[lane] = Ok(1));
@@ -288,7 +288,7 @@ impl Counting<'_> {
         let mut found = [Err(NotCounted::OverLimit), Err(NotCounted::OverLimit)];
         // if the smaller count is not decided, the count with all unknowns is not either
         if (pairs || !self.functions.is_empty()) && !self.is_open(counts) {
-            let stage = Stage { whole: true, ..Stage::new(0, limit) };
+            let stage = CountStage { whole: true, ..CountStage::new(0, limit) };
             found = self.both(stage, [&RelationConsequences::default(); 2]);
         }
         let name = |lane: usize| self.judged.layout.unknowns[lane].name.clone();
@@ -305,7 +305,7 @@ pub(super) fn values_taken(
     compiled: &Compiled,
     judged: &Judgement,
     functions: &[Terms],
-    (seed, limits): (u64, Limits),
+    (seed, limits): (u64, CountLimits),
 ) -> Solutions {
     let degrees = &judged.findings.degrees;
     let last = degrees.rank_profile.iter().position(|&r| r == degrees.rank()).unwrap_or(0);

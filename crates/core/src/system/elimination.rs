@@ -23,7 +23,7 @@ const SUBSTITUTED: usize = 60;
 const PRODUCT: usize = 4000;
 
 /// A system `x' = f`, `y = h` in numbered variables: states, parameters, and signals with their derivatives.
-pub(super) struct System {
+pub(super) struct EliminationSystem {
     /// Variables of the states.
     pub(super) states: Vec<u32>,
     /// `f`, one per state.
@@ -102,7 +102,7 @@ enum TimeDerivative {
 
 struct Elimination<'a> {
     s: &'a mut Algebra,
-    system: &'a System,
+    system: &'a EliminationSystem,
     /// Rates `f`, without the eliminated states.
     rates: Vec<Fraction>,
     /// Expressions of the eliminated states, in the remaining variables.
@@ -116,7 +116,7 @@ struct Elimination<'a> {
 }
 
 /// Expressions of the states, then of the parameters, and true if all were sought within the limit of work.
-pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fraction>>, bool) {
+pub(super) fn eliminate(s: &mut Algebra, system: &EliminationSystem) -> (Vec<Option<Fraction>>, bool) {
     let mut work = Elimination {
         s,
         system,
@@ -141,7 +141,7 @@ pub(super) fn eliminate(s: &mut Algebra, system: &System) -> (Vec<Option<Fractio
 }
 
 /// Outputs and known inputs with their derivatives, by variable.
-fn signals(system: &System) -> BTreeMap<u32, SignalDerivative> {
+fn signals(system: &EliminationSystem) -> BTreeMap<u32, SignalDerivative> {
     let outputs = system.outputs.iter().map(|(_, chain)| (chain, false, true));
     let inputs = system.inputs.iter().map(|(chain, ends)| (chain, *ends, false));
     let mut out = BTreeMap::new();

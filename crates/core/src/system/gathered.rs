@@ -1,6 +1,6 @@
 //! Rows of every output of a model at two points. Verdicts on any set of outputs are ranks of these rows.
 
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::{Field, Reals, Scalars, SplitMix64};
 
 use super::addition::written_apart;
@@ -28,7 +28,7 @@ pub struct Gathered {
     /// Rows of the outputs.
     pub rows: OutputRows,
     /// Bound on the degree of one decision.
-    claim: Claim,
+    claim: RankClaim,
     /// Number of decisions of the verdicts on one set of outputs.
     decisions: usize,
     /// Number of outputs of the model.
@@ -40,7 +40,7 @@ impl Gathered {
     /// fields agree; `None` in real numbers.
     pub fn error_bound(&self, sets: usize) -> Option<f64> {
         let decisions = self.decisions.saturating_mul(sets);
-        let bound = || error_bound(&Claim { decisions, ..self.claim }, 2);
+        let bound = || error_bound(&RankClaim { decisions, ..self.claim }, 2);
         matches!(self.rows, OutputRows::Primes(_)).then(bound)
     }
 
@@ -68,7 +68,7 @@ impl Gathered {
 }
 
 /// Rows of every output of a model at two points, run by run: of each segment of each experiment.
-pub(super) enum RunRows {
+pub(super) enum RunOutputRows {
     /// In two prime fields.
     Primes([Vec<PointRows<Field>>; 2]),
     /// In real numbers of 192 and 308 digits.
@@ -85,7 +85,7 @@ pub(super) fn gather_runs(
     compiled: &Compiled,
     judged: &Judgement,
     attempt: usize,
-) -> Result<(RunRows, u64), ModelError> {
+) -> Result<(RunOutputRows, u64), ModelError> {
     let seed = judged.findings.seed;
     let layout = &judged.layout;
     match judged.certainty {
@@ -101,12 +101,12 @@ pub(super) fn gather_runs(
                     points.field(&mut rng, &mut model.random(seed, &format!("{name}, points")), &mut spent);
                 rows_at(model, compiled, layout, field, &mut rng)
             };
-            Ok((RunRows::Primes([at(0)?, at(1)?]), points.root_order()))
+            Ok((RunOutputRows::Primes([at(0)?, at(1)?]), points.root_order()))
         }
         SystemCertainty::Digits(_) => {
             let mut rng = model.random(seed, &format!("rows of outputs, attempt {attempt}"));
             let first = rows_at(model, compiled, layout, Reals::<10>, &mut rng)?;
-            Ok((RunRows::Digits(first, rows_at(model, compiled, layout, Reals::<16>, &mut rng)?), 1))
+            Ok((RunOutputRows::Digits(first, rows_at(model, compiled, layout, Reals::<16>, &mut rng)?), 1))
         }
     }
 }
@@ -127,10 +127,10 @@ pub fn gather(
     let (runs, root_order) = gather_runs(model, &compiled, &judged, attempt)?;
     let segments = compiled.segments.len().max(1);
     let rows = match runs {
-        RunRows::Primes([first, second]) => {
+        RunOutputRows::Primes([first, second]) => {
             OutputRows::Primes(Box::new([merged(first, segments)?, merged(second, segments)?]))
         }
-        RunRows::Digits(first, second) => {
+        RunOutputRows::Digits(first, second) => {
             OutputRows::Digits(Box::new((merged(first, segments)?, merged(second, segments)?)))
         }
     };
@@ -140,7 +140,7 @@ pub fn gather(
     };
     let runs = segments * model.experiments.max(1);
     let unknowns = judged.layout.unknowns.len();
-    let claim = Claim { order: root_order, ..claim_of(&compiled, &judged.layout, last + 1) };
+    let claim = RankClaim { order: root_order, ..claim_of(&compiled, &judged.layout, last + 1) };
     let decisions = (last + 2) * (1 + 2 * runs) + 2 * unknowns;
     Ok(Gathered { judged, rows, claim, decisions, outputs: model.outputs.len() })
 }

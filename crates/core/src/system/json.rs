@@ -9,8 +9,8 @@ use serde_json::value::RawValue;
 
 use super::error::ModelError;
 use super::model::{
-    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, Named, Place, PlacedExpression, Segment, State,
-    StateStart, SystemModel, check_signs,
+    Constant, FilePlace, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelSegment, Named, PlacedExpression,
+    State, StateStart, SystemModel, check_signs,
 };
 use crate::language::file_error::{json_kind, words};
 use crate::language::{Names, parse_with};
@@ -108,7 +108,7 @@ impl JsonFile<'_> {
         let span = self.span(text);
         // a text without escapes is the same in the file
         let plain = |s: &Range<usize>| self.0.get(s.start + 1..s.end - 1) == Some(text.text.as_str());
-        let place = Place { what, offset: span.clone().filter(plain).map(|s| s.start + 1) };
+        let place = FilePlace { what, offset: span.clone().filter(plain).map(|s| s.start + 1) };
         let expression = parse_with(&text.text, Names::Plain).map_err(|e| {
             let mut error = place.error(e.to_string(), e.span());
             error.span = error.span.or(span);
@@ -228,9 +228,10 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
         let constants = segment.iter().map(|(name, value)| {
             Ok((name.clone(), file.formula(format!("the value of {name} in a segment"), value)?))
         });
-        model
-            .segments
-            .push(Segment { constants: constants.collect::<Result<_, ModelError>>()?, carry: Vec::new() });
+        model.segments.push(ModelSegment {
+            constants: constants.collect::<Result<_, ModelError>>()?,
+            carry: Vec::new(),
+        });
     }
     for text in &layout.observable_combinations {
         model.combinations.push(file.formula(format!("the combination {}", excerpt(&text.text)), text)?);

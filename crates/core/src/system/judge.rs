@@ -1,6 +1,6 @@
 //! Verdicts on any system: degrees on which two random points agree, modulo two primes or in many digits.
 
-use obsdeg_exact::certainty::{Claim, error_bound};
+use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
 
 use super::addition::written_apart;
@@ -408,7 +408,7 @@ fn judge_in_fields(
         let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
         if first.agrees(&second) {
             let error_bound =
-                error_bound(&Claim { order, ..claim(compiled, layout, &first.degrees, runs) }, 2);
+                error_bound(&RankClaim { order, ..claim(compiled, layout, &first.degrees, runs) }, 2);
             if error_bound > CERTAIN {
                 return Err(refuse(format!(
                     "undecided, because the powers in it are too high for primes of 61 bits: two agree, \
@@ -647,7 +647,7 @@ impl Judgement {
 /// With `f_i = N_i / D` over a common denominator, `L_f^k h = P_k / D^(2k+1)`. The degree of `P_k` grows
 /// by at most `delta = max(deg N, deg D) + deg D` an order. Its coefficients grow by the effect of a
 /// derivative and two products.
-fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -> Claim {
+fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -> RankClaim {
     // Decisions at each of ATTEMPTS points: a rank at each order, of all runs and of each alone, here and at
     // a generic point; that no unit vector comes an order early (if the ranks are correct none comes late);
     // and that no column or entry of the last basis is zero by chance.
@@ -656,11 +656,11 @@ fn claim(compiled: &Compiled, layout: &Layout, degrees: &Degrees, runs: usize) -
             + 2 * layout.unknowns.len()
             + 2 * compiled.combinations.len()
             + degrees.rank() * (layout.unknowns.len() - degrees.rank()));
-    Claim { decisions, ..claim_of(compiled, layout, degrees.rank_profile.len()) }
+    RankClaim { decisions, ..claim_of(compiled, layout, degrees.rank_profile.len()) }
 }
 
 /// Size of the claim of one decision on rows of the given number of orders.
-pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> Claim {
+pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> RankClaim {
     let fractions = fractions(&compiled.dag);
     let experiments = 0..compiled.experiments.len();
     let used: Vec<QuotientBounds> = experiments
@@ -688,7 +688,7 @@ pub(super) fn claim_of(compiled: &Compiled, layout: &Layout, orders: usize) -> C
     let step =
         (variables * (degree + (2.0 * orders + 1.0) * below).max(1.0)).log2() + 2.0 * (top_bits + below_bits);
     let bits = top_bits + (orders + 1.0) * step + n.max(1.0).log2();
-    Claim {
+    RankClaim {
         unknowns: layout.unknowns.len(),
         decisions: 1,
         order: 1,

@@ -61,8 +61,9 @@ pub use error::ModelError;
 pub use gathered::{Gathered, OutputRows, gather};
 pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
 pub use model::{
-    Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, Experiment, KnownInput, Named,
-    Nominal, Place, PlacedExpression, Role, Segment, StartTime, State, StateStart, SystemModel,
+    Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, ExperimentChanges, FilePlace,
+    KnownInput, ModelSegment, Named, Nominal, PlacedExpression, Role, StartTime, State, StateStart,
+    SystemModel,
 };
 pub use reduced::{Reduced, ReducedError, reduced};
 pub use rows::{Layout, OwnRows, PointRows, Unknown};

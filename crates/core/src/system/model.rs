@@ -13,7 +13,7 @@ use crate::title_block::TitleBlock;
 
 /// Place of a text in a model file.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Place {
+pub struct FilePlace {
     /// Description of the entry: `the equation of x1`.
     pub what: String,
     /// Byte offset in the file at which the text begins; `None` if it is unknown.
@@ -28,7 +28,7 @@ pub struct PlacedExpression {
     /// Expression that was read from the text.
     pub expression: Expression,
     /// Place of the text.
-    pub place: Place,
+    pub place: FilePlace,
 }
 
 /// Name with unit and description.
@@ -100,7 +100,7 @@ pub struct Candidate {
 
 /// Part of the timeline with its own constants and a map of the states at its beginning.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Segment {
+pub struct ModelSegment {
     /// Constants with another value.
     pub constants: Vec<(String, PlacedExpression)>,
     /// States that jump: their values after the jump, in terms of those before.
@@ -109,7 +109,7 @@ pub struct Segment {
 
 /// Entries in which one experiment differs.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Experiment {
+pub struct ExperimentChanges {
     /// Constants with another value.
     pub constants: Vec<(String, PlacedExpression)>,
     /// Known inputs of another kind.
@@ -187,9 +187,9 @@ pub struct SystemModel {
     /// Number of experiments: runs with their own starts and unknown inputs; parameters are shared.
     pub experiments: usize,
     /// Differences of the experiments; empty if there are none.
-    pub own: Vec<Experiment>,
+    pub own: Vec<ExperimentChanges>,
     /// Segments; empty for a single one without changes.
-    pub segments: Vec<Segment>,
+    pub segments: Vec<ModelSegment>,
     /// Constraints: expressions of states, parameters and constants that are zero at the start of every
     /// experiment, with the equation as their text.
     pub constraints: Vec<PlacedExpression>,
@@ -249,7 +249,7 @@ impl Nominal {
     }
 }
 
-impl Place {
+impl FilePlace {
     /// Error in the text of this place, at a byte range of it.
     pub fn error(&self, message: String, range: Range<usize>) -> ModelError {
         let span = self.offset.map(|o| o + range.start..o + range.end);
@@ -294,7 +294,7 @@ pub struct Compiled {
     /// Nodes of the combinations.
     pub combinations: Vec<usize>,
     /// Place at which each division and root was written first.
-    pub places: HashMap<usize, (Place, Range<usize>)>,
+    pub places: HashMap<usize, (FilePlace, Range<usize>)>,
 }
 
 impl Compiled {

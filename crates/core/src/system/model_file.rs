@@ -10,8 +10,8 @@ use toml::Value;
 
 use super::error::ModelError;
 use super::model::{
-    Constant, Experiment, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, Named, PlacedExpression, Segment,
-    StartTime, State, StateStart, SystemModel, check_signs,
+    Constant, ExperimentChanges, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelSegment, Named,
+    PlacedExpression, StartTime, State, StateStart, SystemModel, check_signs,
 };
 use super::nominal::{SimulationEntry, nominal};
 use super::reader::{Formulas, ModelReader, base, declared, in_order, last_mention};
@@ -357,8 +357,8 @@ impl ModelReader<'_> {
         i: usize,
         entry: &ExperimentEntry,
         model: &SystemModel,
-    ) -> Result<Experiment, ModelError> {
-        let mut out = Experiment::default();
+    ) -> Result<ExperimentChanges, ModelError> {
+        let mut out = ExperimentChanges::default();
         let own = format!("of experiment {}", i + 1);
         for (name, value) in in_order(&entry.constants) {
             let what = format!("the constant {name} {own}");
@@ -380,8 +380,8 @@ impl ModelReader<'_> {
     }
 
     /// Segment `i`, counted from 0.
-    fn segment(&self, i: usize, segment: &SegmentEntry) -> Result<Segment, ModelError> {
-        let mut out = Segment::default();
+    fn segment(&self, i: usize, segment: &SegmentEntry) -> Result<ModelSegment, ModelError> {
+        let mut out = ModelSegment::default();
         for (list, map, kind) in [
             (&mut out.constants, &segment.constants, "the constant"),
             (&mut out.carry, &segment.carry, "the carried state"),

@@ -7,7 +7,7 @@ use serde_spanned::Spanned;
 use toml::Value;
 
 use super::error::ModelError;
-use super::model::{Named, Place, PlacedExpression};
+use super::model::{FilePlace, Named, PlacedExpression};
 use crate::language::vectors::{Mismatch, stacked};
 use crate::language::{Expression, MAX_ENTRIES, Node, Shape, Shapes, parse_components, parse_equation};
 use crate::model::angle::excerpt;
@@ -184,7 +184,7 @@ impl ModelReader<'_> {
             false => self.text[*cursor..span.end].find(&source).map(|o| *cursor + o),
         };
         *cursor = offset.map_or(*cursor, |o| o + source.len());
-        let place = Place { what: what.into(), offset };
+        let place = FilePlace { what: what.into(), offset };
         let read = parse_components(&source, &self.shapes).map_err(|e| {
             let mut error = place.error(e.to_string(), e.span());
             error.span.get_or_insert(span.clone());
@@ -206,7 +206,7 @@ impl ModelReader<'_> {
     ) -> Result<(Vec<PlacedExpression>, Option<PlacedExpression>), ModelError> {
         let (text, span) = (equation.get_ref().trim(), equation.span());
         let offset = self.text[span.clone()].find(text).map(|o| span.start + o);
-        let place = Place { what: format!("the constraint {}", excerpt(text)), offset };
+        let place = FilePlace { what: format!("the constraint {}", excerpt(text)), offset };
         let (read, size) = parse_equation(text, &self.shapes).map_err(|e| {
             let mut error = place.error(e.to_string(), e.span());
             error.span.get_or_insert(span);

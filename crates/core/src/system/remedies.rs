@@ -6,12 +6,12 @@ use obsdeg_exact::Reals;
 
 use super::judge::{Judgement, climb_at, judge_beside};
 use super::model::{
-    Compiled, Constant, KnownInput, Named, Place, PlacedExpression, Role, StateStart, SystemModel,
+    Compiled, Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StateStart, SystemModel,
 };
 use super::values::Values;
 use super::work::{Spent, product};
 use crate::language::{Expression, Node};
-use crate::remedies::{Change, Directions, Information, MOST_PAIRED, Remedies, Remedy, Resolved};
+use crate::remedies::{CandidateInformation, Change, Directions, MOST_PAIRED, Remedies, Remedy, Resolved};
 use crate::why::{Improvement, is_lower};
 
 /// Largest number of verdicts on single changes of a model of up to `UNKNOWNS` unknowns; half as many on
@@ -191,7 +191,8 @@ impl<'a> ModelRemedySearch<'a> {
         if complete {
             // one more than are paired shows that there are more
             let paired = self.roles.iter().take(MOST_PAIRED + 1);
-            let values: Vec<Information<S>> = paired.map(|(_, columns)| directions.known(columns)).collect();
+            let values: Vec<CandidateInformation<S>> =
+                paired.map(|(_, columns)| directions.known(columns)).collect();
             complete = directions.pairs(&values, None, left, |i, j| {
                 work = work.checked_sub(1)?;
                 let changes = [i, j].map(|k| self.known(self.roles[k].0));
@@ -410,7 +411,7 @@ fn measure(model: &mut SystemModel, state: &str) {
         nodes: vec![Node::Name(state.into())],
         spans: std::iter::once(0..state.len()).collect(),
     };
-    let place = Place { what: format!("the output {name}"), offset: None };
+    let place = FilePlace { what: format!("the output {name}"), offset: None };
     let named = Named { name, ..Named::default() };
     model.outputs.push((named, PlacedExpression { text: state.into(), expression, place }));
 }

@@ -14,7 +14,7 @@ use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Field, SplitMix64};
 
 use super::dag::Op;
-use super::elimination::{System, eliminate};
+use super::elimination::{EliminationSystem, eliminate};
 use super::fibre::reached;
 use super::formula;
 use super::judge::Judgement;
@@ -169,7 +169,7 @@ fn by_elimination(
     };
     let numbers = |list: &[usize]| -> Vec<u32> { list.iter().map(|&i| i as u32).collect() };
     let fraction = |node: usize| fractions[node].clone().ok_or(NoExpressions::NotRational);
-    let system = System {
+    let system = EliminationSystem {
         states: numbers(&signals.states),
         rates: compiled.rates(0).iter().map(|&r| fraction(r)).collect::<Result<_, _>>()?,
         parameters: numbers(&signals.parameters),

@@ -4,7 +4,7 @@ use obsdeg_exact::{RowSpace, Scalars};
 
 use super::answer::{SystemAnalysis, SystemOptions};
 use super::error::ModelError;
-use super::gathered::{RunRows, gather_runs};
+use super::gathered::{RunOutputRows, gather_runs};
 use super::judge::{Judgement, judge_beside, judge_compiled};
 use super::model::{Compiled, Constant, KnownInput, StateStart, SystemModel};
 use super::remedies::improvements;
@@ -106,10 +106,10 @@ fn decided(
         place: place(model, run),
     };
     match runs {
-        RunRows::Primes([first, second]) => {
+        RunOutputRows::Primes([first, second]) => {
             at_two_points(judged, column, labelled(first), labelled(second), derivatives)
         }
-        RunRows::Digits(first, second) => {
+        RunOutputRows::Digits(first, second) => {
             at_two_points(judged, column, labelled(first), labelled(second), derivatives)
         }
     }

@@ -38,7 +38,7 @@ pub(super) struct JetSource<'a> {
 }
 
 /// Jets of the outputs that are independent of those before them, as functions of the states that change.
-pub(super) struct Structure {
+pub(super) struct JetStructure {
     /// First order, per output, that depends on the jets before it.
     pub(super) first_dependent: Vec<usize>,
     /// True, per output, if it does not change in time.
@@ -179,7 +179,7 @@ impl<'a> JetSource<'a> {
     }
 
     /// Independent jets at a random point; `None` if no point was found.
-    pub(super) fn structure(&self, values: &[u64], rng: &mut SplitMix64) -> Option<Structure> {
+    pub(super) fn structure(&self, values: &[u64], rng: &mut SplitMix64) -> Option<JetStructure> {
         let (f, n) = (self.f, self.moving.len());
         let orders = n + BEYOND + 2;
         let mut series = self.series(values, Some(orders), rng)?;
@@ -188,7 +188,7 @@ impl<'a> JetSource<'a> {
             .filter_map(|r| if let Role::KnownInput(i) = *r { Some(i) } else { None })
             .collect();
         let mut space = Echelon::new(f, n);
-        let mut out = Structure {
+        let mut out = JetStructure {
             first_dependent: vec![usize::MAX; outputs.len()],
             still: vec![false; outputs.len()],
             inputs: vec![Vec::new(); outputs.len()],
@@ -224,7 +224,7 @@ impl<'a> JetSource<'a> {
     }
 }
 
-impl Structure {
+impl JetStructure {
     /// Jets of outputs that change in time, up to their first dependent order, and `beyond` more for output
     /// `leader` (for all outputs without one), with the jets of inputs in them; sorted by order, outputs
     /// last.

@@ -22,7 +22,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 use super::judge::Judgement;
 use super::model::{Compiled, SystemModel};
 use jets::JetSource;
-use ratios::{Pool, Ratio, ratios};
+use ratios::{CoefficientRatio, Pool, ratios};
 use relation::{Relation, relations};
 
 /// Largest numbers of evaluations of a relation for one ratio, in steps: results of a cheap step make the
@@ -138,7 +138,7 @@ impl ConstantFibre {
         rng: &mut SplitMix64,
         work: &mut RemainingWork,
     ) -> Result<(), OverLimit> {
-        let mut all: Vec<Ratio> = Vec::new();
+        let mut all: Vec<CoefficientRatio> = Vec::new();
         for numbered in relations.iter().enumerate() {
             all.extend(ratios(source, numbered, &self.at, &self.variables, rng, work)?);
         }
@@ -180,9 +180,14 @@ impl ConstantFibre {
 
     /// Removes from the list the ratios of at most `limit` evaluations that are used: those that raise the
     /// rank, the cheapest first, and some others at random.
-    fn chosen(&self, all: &mut Vec<Ratio>, limit: usize, rng: &mut SplitMix64) -> Vec<Ratio> {
+    fn chosen(
+        &self,
+        all: &mut Vec<CoefficientRatio>,
+        limit: usize,
+        rng: &mut SplitMix64,
+    ) -> Vec<CoefficientRatio> {
         let places = self.places();
-        let depends = |r: &Ratio| places.iter().any(|&k| r.gradient[k] != 0);
+        let depends = |r: &CoefficientRatio| places.iter().any(|&k| r.gradient[k] != 0);
         let mut left: Vec<(usize, usize)> = (all.iter().enumerate())
             .filter(|(_, r)| depends(r))
             .map(|(i, r)| (r.cost(&places), i))
@@ -205,7 +210,7 @@ impl ConstantFibre {
             taken.push(left.swap_remove(at).1);
         }
         taken.sort_unstable();
-        let mut out: Vec<Ratio> = taken.into_iter().rev().map(|i| all.remove(i)).collect();
+        let mut out: Vec<CoefficientRatio> = taken.into_iter().rev().map(|i| all.remove(i)).collect();
         out.reverse();
         out
     }

@@ -24,7 +24,7 @@ const SPARE: usize = 3;
 
 /// Ratio of two coefficients of a relation that is not constant.
 #[derive(Debug, Clone)]
-pub(super) struct Ratio {
+pub(super) struct CoefficientRatio {
     pub(super) relation: usize,
     above: usize,
     below: usize,
@@ -94,7 +94,7 @@ pub(super) fn ratios(
     variables: &[usize],
     rng: &mut SplitMix64,
     work: &mut RemainingWork,
-) -> Result<Vec<Ratio>, OverLimit> {
+) -> Result<Vec<CoefficientRatio>, OverLimit> {
     let f = source.f;
     let direction: Vec<(usize, u64)> = variables.iter().map(|&v| (v, rng.below(f.modulus()))).collect();
     let line = on_line(source, relation, at, &direction, None, LINE, (&mut *rng, &mut *work))?;
@@ -142,7 +142,7 @@ pub(super) fn ratios(
         });
         if let Some(parts) = parts.collect::<Option<Vec<_>>>() {
             let (own, gradient) = parts.into_iter().unzip();
-            out.push(Ratio { relation: number, above, below, degrees, own, gradient });
+            out.push(CoefficientRatio { relation: number, above, below, degrees, own, gradient });
         }
     }
     Ok(out)
@@ -174,7 +174,7 @@ fn boxed_count(total: usize, limits: &[usize]) -> usize {
     table.iter().fold(0, |s: usize, &x| s.saturating_add(x))
 }
 
-impl Ratio {
+impl CoefficientRatio {
     /// Limits of the degrees in the open variables, of the numerator or (`below`) of the denominator.
     fn limits(&self, open: &[usize], below: bool) -> Vec<usize> {
         open.iter().map(|&k| if below { self.own[k].1 } else { self.own[k].0 }).collect()
@@ -240,7 +240,7 @@ impl<'s, 'a> Pool<'s, 'a> {
     /// [`OverLimit`].
     pub(super) fn function(
         &mut self,
-        ratio: &Ratio,
+        ratio: &CoefficientRatio,
         open: &[usize],
         rng: &mut SplitMix64,
         work: &mut RemainingWork,

@@ -7,7 +7,7 @@ use obsdeg_exact::dense::ColumnEchelon;
 use obsdeg_exact::groebner::{OverLimit, RemainingWork};
 use obsdeg_exact::{Field, SplitMix64};
 
-use super::jets::{BEYOND, Jet, JetSource, Structure};
+use super::jets::{BEYOND, Jet, JetSource, JetStructure};
 
 /// Largest number of products of jets among which a relation is sought.
 const MONOMIALS: usize = 4000;
@@ -127,7 +127,7 @@ impl JetPoints<'_, '_> {
 /// output, or all of a few products if these suffice. Contains what was found when the work ended.
 pub(super) fn relations(
     source: &JetSource<'_>,
-    structure: &Structure,
+    structure: &JetStructure,
     at: &[u64],
     rng: &mut SplitMix64,
     work: &mut RemainingWork,
@@ -191,7 +191,7 @@ fn together(
 /// the smallest set of products that has one.
 fn led_by(
     source: &JetSource<'_>,
-    structure: &Structure,
+    structure: &JetStructure,
     leader: usize,
     at: &[u64],
     rng: &mut SplitMix64,
