@@ -56,7 +56,7 @@ pub const CHANNELS: usize = 4;
 
 /// Sample: its line, time and channels, and their standard deviations where the record gives them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct BinSample {
     /// Line of the record.
     pub line: u64,
     /// Time, in s.
@@ -89,7 +89,7 @@ pub struct Binner {
     sigmas: Vec<f64>,
     /// Spreads of the samples about the lines of the last bins, by channel.
     spreads: Vec<VecDeque<f64>>,
-    now: Vec<Sample>,
+    now: Vec<BinSample>,
 }
 
 impl Binner {
@@ -99,7 +99,7 @@ impl Binner {
     }
 
     /// Adds a sample; returns the bins that it ends.
-    pub fn push(&mut self, sample: Sample, spikes: &mut Vec<Spike>) -> Vec<Bin> {
+    pub fn push(&mut self, sample: BinSample, spikes: &mut Vec<Spike>) -> Vec<Bin> {
         // a small margin, so that samples every 10 s are bins of 10 s
         let ends = self.now.first().is_some_and(|first| {
             sample.sigma.is_some() || sample.t - first.t >= self.length_s * (1.0 - 1e-9)
@@ -114,7 +114,8 @@ impl Binner {
     pub fn end(&mut self, spikes: &mut Vec<Spike>) -> Vec<Bin> {
         let mut now = std::mem::take(&mut self.now);
         let alone = |c: usize| now.len() > 1 && now.iter().filter(|s| s.z[c].is_some()).count() == 1;
-        let same = |a: &Sample, b: &Sample| a.z.iter().zip(&b.z).all(|(a, b)| a.is_some() == b.is_some());
+        let same =
+            |a: &BinSample, b: &BinSample| a.z.iter().zip(&b.z).all(|(a, b)| a.is_some() == b.is_some());
         let bins = match (0..self.sigmas.len()).any(alone) {
             true => now.chunk_by(same).filter_map(|part| self.bin(part, spikes)).collect(),
             false => self.bin(&now, spikes).into_iter().collect(),
@@ -137,7 +138,7 @@ impl Binner {
         if scale > 0.0 { scale } else { self.sigmas[c] }
     }
 
-    fn bin(&mut self, now: &[Sample], spikes: &mut Vec<Spike>) -> Option<Bin> {
+    fn bin(&mut self, now: &[BinSample], spikes: &mut Vec<Spike>) -> Option<Bin> {
         let (first, last) = (now.first()?, now.last()?);
         let t = first.t + now.iter().map(|s| s.t - first.t).sum::<f64>() / now.len() as f64;
         let channels = (0..self.sigmas.len()).map(|c| self.channel(now, c, t, spikes)).collect();
@@ -146,7 +147,7 @@ impl Binner {
         Some(Bin { t, lines: (first.line, last.line), channels, temperature })
     }
 
-    fn channel(&mut self, now: &[Sample], c: usize, t: f64, spikes: &mut Vec<Spike>) -> Option<Mean> {
+    fn channel(&mut self, now: &[BinSample], c: usize, t: f64, spikes: &mut Vec<Spike>) -> Option<Mean> {
         let mut points: Vec<(f64, f64, u64)> =
             now.iter().filter_map(|s| Some((s.t - t, s.z[c]?, s.line))).collect();
         if let ([(_, value, _)], Some(sigma)) = (&points[..], now.first().and_then(|s| s.sigma)) {
@@ -224,11 +225,11 @@ mod tests {
 
     use super::*;
 
-    fn sample(line: u64, t: f64, z: f64) -> Sample {
-        Sample { line, t, z: [Some(z), None, None, None], sigma: None, temperature: None }
+    fn sample(line: u64, t: f64, z: f64) -> BinSample {
+        BinSample { line, t, z: [Some(z), None, None, None], sigma: None, temperature: None }
     }
 
-    fn binned(samples: impl Iterator<Item = Sample>) -> (Vec<Bin>, Vec<Spike>) {
+    fn binned(samples: impl Iterator<Item = BinSample>) -> (Vec<Bin>, Vec<Spike>) {
         let (mut binner, mut spikes) = (Binner::new(10.0, vec![1e-3]), Vec::new());
         let mut bins: Vec<Bin> = samples.flat_map(|s| binner.push(s, &mut spikes)).collect();
         bins.extend(binner.end(&mut spikes));
@@ -313,7 +314,7 @@ mod tests {
     fn missing_cells_move_no_middle() {
         let two = |i: u64| {
             let (t, there) = (5.0 * i as f64, |missing: bool| (!missing).then_some(7.0 * i as f64));
-            Sample { z: [there(i.is_multiple_of(7)), there(i % 5 == 1), None, None], ..sample(i, t, 0.0) }
+            BinSample { z: [there(i.is_multiple_of(7)), there(i % 5 == 1), None, None], ..sample(i, t, 0.0) }
         };
         let (mut binner, mut spikes) = (Binner::new(10.0, vec![1e-3; 2]), Vec::new());
         let mut bins: Vec<Bin> = (0..60).flat_map(|i| binner.push(two(i), &mut spikes)).collect();
@@ -329,7 +330,7 @@ mod tests {
     fn dense_rows_with_empty_cells_stay_together() {
         let two = |i: u64| {
             let other = (i % 2 == 1).then_some(7.0 * i as f64);
-            Sample { z: [Some(7.0 * i as f64), other, None, None], ..sample(i, i as f64, 0.0) }
+            BinSample { z: [Some(7.0 * i as f64), other, None, None], ..sample(i, i as f64, 0.0) }
         };
         let (mut binner, mut spikes) = (Binner::new(10.0, vec![1e-3; 2]), Vec::new());
         let mut bins: Vec<Bin> = (0..60).flat_map(|i| binner.push(two(i), &mut spikes)).collect();
@@ -343,7 +344,7 @@ mod tests {
     /// A sample with its own sigma is a bin of its own; gaps make no bins.
     #[test]
     fn given_sigmas_and_gaps() {
-        let given = |line: u64, z: Option<f64>| Sample {
+        let given = |line: u64, z: Option<f64>| BinSample {
             line,
             t: line as f64,
             z: [z, None, None, None],

@@ -72,7 +72,7 @@ struct OfNoise {
 
 /// Information of a run on its start.
 #[derive(Debug, Clone)]
-pub struct Information {
+pub struct StartInformation {
     /// Root `S` (n x n) of the information on the start.
     pub root: DMatrix<f64>,
     /// Right side of `S d = right`, with d the most probable correction of the trajectory's start.
@@ -84,14 +84,14 @@ pub struct Information {
 
 /// State of a run by all its measurements.
 #[derive(Debug, Clone, PartialEq)]
-pub struct State {
+pub struct RunState {
     /// Correction of the trajectory's state.
     pub correction: DVector<f64>,
     /// Root (n x any) of the error covariance, which is this times its transpose.
     pub root: DMatrix<f64>,
 }
 
-impl State {
+impl RunState {
     /// Standard deviation of a component.
     pub fn sigma(&self, i: usize) -> f64 {
         self.root.row(i).norm()
@@ -217,7 +217,7 @@ impl Backward {
     }
 }
 
-impl Information {
+impl StartInformation {
     /// Information of a run.
     ///
     /// # Errors
@@ -258,17 +258,17 @@ impl Information {
     ///
     /// # Errors
     /// [`EkfError::Singular`].
-    pub fn states(&self, run: &Linearised, start: State) -> Result<Vec<State>, EkfError> {
+    pub fn states(&self, run: &Linearised, start: RunState) -> Result<Vec<RunState>, EkfError> {
         let mut out = vec![start];
         let mut gaps = run.gaps.iter().peekable();
         for (step, ((stage, g), of)) in run.stages.iter().zip(&run.roots).zip(&self.noise).enumerate() {
-            let Some(State { correction: d, root: p }) = out.last() else { break };
+            let Some(RunState { correction: d, root: p }) = out.last() else { break };
             let phi = stage.transition.matrix();
             let solve = |b: &DMatrix<f64>| {
                 of.own.solve_upper_triangular(b).ok_or(EkfError::Singular { column: of.own.ncols() })
             };
             let mut next = if g.ncols() == 0 {
-                State { correction: &phi * d, root: &phi * p }
+                RunState { correction: &phi * d, root: &phi * p }
             } else {
                 let right = &of.right - &of.before * d;
                 let xi = solve(&DMatrix::from_column_slice(right.len(), 1, right.as_slice()))?;
@@ -279,7 +279,7 @@ impl Information {
                 let mut both = (&through * p).resize_horizontally(m + own.ncols(), 0.0);
                 both.columns_mut(m, own.ncols()).copy_from(&own);
                 let root = if both.ncols() > n { both.transpose().qr().r().transpose() } else { both };
-                State { correction: &phi * d + g * xi.column(0), root }
+                RunState { correction: &phi * d + g * xi.column(0), root }
             };
             if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
                 next.correction += gap;
@@ -292,7 +292,7 @@ impl Information {
 
 /// Least-squares solution of stacked rows.
 #[derive(Debug, Clone)]
-pub struct Solution {
+pub struct LeastSquaresSolution {
     /// Unknowns (shape n).
     pub x: DVector<f64>,
     /// Inverse root of the information (n x any): the covariance is this times its transpose.
@@ -305,11 +305,11 @@ pub struct Solution {
 
 /// Rows `A x = b` with unit errors, stacked.
 #[derive(Debug, Clone)]
-pub struct Rows {
+pub struct StackedRows {
     all: DMatrix<f64>,
 }
 
-impl Rows {
+impl StackedRows {
     /// No rows, for n unknowns.
     pub fn new(n: usize) -> Self {
         Self { all: DMatrix::zeros(0, n + 1) }
@@ -328,7 +328,7 @@ impl Rows {
     ///
     /// # Errors
     /// [`EkfError::Singular`] when the rows do not determine all unknowns.
-    pub fn solve(&self) -> Result<Solution, EkfError> {
+    pub fn solve(&self) -> Result<LeastSquaresSolution, EkfError> {
         let n = self.all.ncols() - 1;
         let r = triangle(self.all.clone(), n + 1);
         let root = r.view((0, 0), (n, n)).into_owned();
@@ -341,11 +341,11 @@ impl Rows {
             root.solve_upper_triangular(&DMatrix::identity(n, n)).ok_or(EkfError::Singular { column: n })?;
         let right = r.view((0, n), (n, 1)).column(0).into_owned();
         let x = &inverse_root * right;
-        Ok(Solution { x, inverse_root, root, left: r[(n, n)].powi(2) })
+        Ok(LeastSquaresSolution { x, inverse_root, root, left: r[(n, n)].powi(2) })
     }
 }
 
-impl Solution {
+impl LeastSquaresSolution {
     /// Covariance (n x n).
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.inverse_root * self.inverse_root.transpose()
@@ -391,7 +391,7 @@ mod tests {
     fn what_is_known_stays_as_it_is() {
         let j = DMatrix::from_fn(5, 3, |i, k| ((3 * i + k) as f64 * 1.7).sin() * 4.0);
         let known = DMatrix::from_row_slice(2, 3, &[2.0, 0.3, 0.0, -1.0, 4.0, 0.5]);
-        let mut rows = Rows::new(3);
+        let mut rows = StackedRows::new(3);
         rows.add(&j, &DVector::zeros(5));
         rows.add(&known, &DVector::zeros(2));
         let solution = rows.solve().expect("determined");
@@ -475,12 +475,12 @@ mod tests {
         let run = random_walk();
         let NormalEquations { maps, covariance, right, squares } = normal_equations();
         let x = &covariance * &right;
-        let found = Information::of(&run).expect("finite");
-        let mut rows = Rows::new(3);
+        let found = StartInformation::of(&run).expect("finite");
+        let mut rows = StackedRows::new(3);
         rows.add(&found.root, &found.right);
         let solution = rows.solve().expect("determined");
         assert!((found.left - (squares - right.dot(&x))).abs() < 1e-10);
-        let start = State { correction: solution.x.clone(), root: solution.inverse_root.clone() };
+        let start = RunState { correction: solution.x.clone(), root: solution.inverse_root.clone() };
         let states = found.states(&run, start).expect("regular");
         assert_eq!(states.len(), 9);
         for (k, (state, map)) in states.iter().zip(&maps).enumerate() {
@@ -495,7 +495,7 @@ mod tests {
     #[test]
     fn gaps_change_nothing() {
         let run = random_walk();
-        let found = Information::of(&run).expect("finite");
+        let found = StartInformation::of(&run).expect("finite");
         let c = DVector::from_column_slice(&[0.6, -1.1, 0.4]);
         let mut parted = Linearised { gaps: vec![(4, -&c)], ..run.clone() };
         let (phi, mut at) = (phi(), c);
@@ -504,7 +504,7 @@ mod tests {
             at = &phi * at;
             parted.residuals[row] -= at[0] + 0.5 * at[1];
         }
-        let again = Information::of(&parted).expect("finite");
+        let again = StartInformation::of(&parted).expect("finite");
         assert!((again.at_zero() - found.at_zero()).abs() < 1e-9);
         assert!((again.left - found.left).abs() < 1e-9 && (&again.right - &found.right).amax() < 1e-9);
     }

@@ -29,7 +29,7 @@ pub const STANDARD_GRAVITY: f64 = 9.80665;
 
 /// Place of an error in a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct RecordPlace {
     /// Name of the record.
     pub record: String,
     /// Line from 1, including the header; for Parquet the row from 1.
@@ -38,7 +38,7 @@ pub struct Place {
     pub column: String,
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for RecordPlace {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: line {}", self.record, self.line)?;
         if self.column.is_empty() { Ok(()) } else { write!(f, ", column `{}`", self.column) }
@@ -66,7 +66,7 @@ pub enum RecordError {
     #[error("{place}: expected a name, or a name with its unit as in `fx [g]`, once")]
     Header {
         /// Place of the header.
-        place: Place,
+        place: RecordPlace,
     },
     /// A required column does not exist.
     #[error("{record}: no column {expected}; found {found}{hint}")]
@@ -84,7 +84,7 @@ pub enum RecordError {
     #[error("{place}: expected {expected}")]
     Unit {
         /// Place of the column.
-        place: Place,
+        place: RecordPlace,
         /// Units that are allowed.
         expected: String,
     },
@@ -100,7 +100,7 @@ pub enum RecordError {
     #[error("{place}: expected {expected}, found `{found}`")]
     Number {
         /// Place of the cell.
-        place: Place,
+        place: RecordPlace,
         /// Expected content.
         expected: &'static str,
         /// Content that was found.
@@ -110,7 +110,7 @@ pub enum RecordError {
     #[error("{place}: found {found}, expected {expected}")]
     Value {
         /// Place of the cell.
-        place: Place,
+        place: RecordPlace,
         /// Number that was found.
         found: String,
         /// Expected values.
@@ -120,7 +120,7 @@ pub enum RecordError {
     #[error("{place}: {found} cells; expected {expected}, as in the header")]
     Cells {
         /// Place of the row.
-        place: Place,
+        place: RecordPlace,
         /// Number of cells found.
         found: usize,
         /// Number of columns of the header.
@@ -132,7 +132,7 @@ pub enum RecordError {
     )]
     Time {
         /// Place of the time.
-        place: Place,
+        place: RecordPlace,
         /// Time that was found.
         found: String,
         /// Time of the row before.
@@ -148,7 +148,7 @@ pub enum RecordError {
 
 /// Column of a header.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub struct RecordColumn {
     /// Name of the column.
     pub name: String,
     /// Unit of the column; `None` if the header states none.
@@ -163,7 +163,7 @@ pub struct Column {
     pub other: Option<String>,
 }
 
-impl Column {
+impl RecordColumn {
     fn of(text: &str) -> Option<Self> {
         let whole = text.trim();
         let (name, unit) = match whole.split_once('[') {
@@ -195,7 +195,7 @@ const PIPED: u64 = 1 << 28;
 /// Record whose header has been read.
 pub struct Record {
     name: String,
-    columns: Vec<Column>,
+    columns: Vec<RecordColumn>,
     rows: RowSource,
     /// Separator and decimal mark in words; `None` for commas and points.
     written: Option<String>,
@@ -212,7 +212,7 @@ pub struct Wanted {
 
 /// Row: its requested numbers (`None` for an empty cell) and its label.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row<'a> {
+pub struct RecordRow<'a> {
     /// Line from 1.
     pub line: u64,
     /// Requested numbers, in their order.
@@ -354,7 +354,7 @@ impl Record {
     }
 
     /// Columns of the record.
-    pub fn columns(&self) -> &[Column] {
+    pub fn columns(&self) -> &[RecordColumn] {
         &self.columns
     }
 
@@ -437,7 +437,7 @@ impl Record {
         }
     }
 
-    fn at(&self, line: u64, column: usize) -> Place {
+    fn at(&self, line: u64, column: usize) -> RecordPlace {
         place(&self.name, line, &self.columns[column].text)
     }
 
@@ -455,13 +455,13 @@ impl Record {
         wanted: &[Wanted],
         label: Option<usize>,
         anew: bool,
-        mut each: impl FnMut(Row<'_>) -> Result<(), E>,
+        mut each: impl FnMut(RecordRow<'_>) -> Result<(), E>,
     ) -> Result<String, E> {
         let Self { name, columns, rows, .. } = self;
         let mut check = RowCheck::new(&name, &columns, wanted, anew);
         let mut row = |line: u64, cell: &mut dyn FnMut(usize) -> CellContent, label: &str| -> Result<(), E> {
             let numbers = check.numbers(line, cell, label)?;
-            each(Row { line, numbers: &numbers[..wanted.len()], label })
+            each(RecordRow { line, numbers: &numbers[..wanted.len()], label })
         };
         match rows {
             RowSource::Csv(mut lines) => {
@@ -507,7 +507,7 @@ impl Record {
 struct RowCheck<'a> {
     /// Name of the record.
     record: &'a str,
-    columns: &'a [Column],
+    columns: &'a [RecordColumn],
     wanted: &'a [Wanted],
     /// True if times may start again with another label.
     anew: bool,
@@ -521,13 +521,13 @@ struct RowCheck<'a> {
 }
 
 impl<'a> RowCheck<'a> {
-    fn new(record: &'a str, columns: &'a [Column], wanted: &'a [Wanted], anew: bool) -> Self {
+    fn new(record: &'a str, columns: &'a [RecordColumn], wanted: &'a [Wanted], anew: bool) -> Self {
         let (digest, before, last) = (Sha256::new(), f64::NEG_INFINITY, String::new());
         Self { record, columns, wanted, anew, digest, before, last, any: false }
     }
 
     /// Place of the requested number `i` in a line.
-    fn at(&self, line: u64, i: usize) -> Place {
+    fn at(&self, line: u64, i: usize) -> RecordPlace {
         place(self.record, line, &self.columns[self.wanted[i].column].text)
     }
 
@@ -660,16 +660,16 @@ fn text_of(field: &Field) -> String {
     }
 }
 
-fn place(record: &str, line: u64, column: &str) -> Place {
-    Place { record: record.into(), line, column: column.into() }
+fn place(record: &str, line: u64, column: &str) -> RecordPlace {
+    RecordPlace { record: record.into(), line, column: column.into() }
 }
 
 /// Columns of the headers; each name occurs once.
-fn columns(record: &str, headers: Vec<String>, line: u64) -> Result<Vec<Column>, RecordError> {
-    let mut out: Vec<Column> = Vec::with_capacity(headers.len());
+fn columns(record: &str, headers: Vec<String>, line: u64) -> Result<Vec<RecordColumn>, RecordError> {
+    let mut out: Vec<RecordColumn> = Vec::with_capacity(headers.len());
     let mut names = HashSet::new();
     for text in headers {
-        let found = Column::of(&text).filter(|c| names.insert(c.name.clone()));
+        let found = RecordColumn::of(&text).filter(|c| names.insert(c.name.clone()));
         out.push(found.ok_or_else(|| RecordError::Header { place: place(record, line, text.trim()) })?);
     }
     Ok(out)

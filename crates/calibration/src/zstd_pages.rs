@@ -80,7 +80,7 @@ impl<R: ChunkReader + 'static> RowGroupReader for RowGroup<'_, R> {
             return Ok(Box::new(SerializedPageReader::new(chunks, column, rows, None)?));
         }
         let plain = column.clone().into_builder().set_compression(Compression::UNCOMPRESSED).build()?;
-        Ok(Box::new(Pages { compressed: SerializedPageReader::new(chunks, &plain, rows, None)? }))
+        Ok(Box::new(ZstdPages { compressed: SerializedPageReader::new(chunks, &plain, rows, None)? }))
     }
 
     fn get_column_bloom_filter(&self, _: usize) -> Option<&Sbbf> {
@@ -93,11 +93,11 @@ impl<R: ChunkReader + 'static> RowGroupReader for RowGroup<'_, R> {
 }
 
 /// Pages of a column by zstd, decompressed.
-struct Pages<R: ChunkReader> {
+struct ZstdPages<R: ChunkReader> {
     compressed: SerializedPageReader<R>,
 }
 
-impl<R: ChunkReader> Iterator for Pages<R> {
+impl<R: ChunkReader> Iterator for ZstdPages<R> {
     type Item = Result<Page>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -105,7 +105,7 @@ impl<R: ChunkReader> Iterator for Pages<R> {
     }
 }
 
-impl<R: ChunkReader> PageReader for Pages<R> {
+impl<R: ChunkReader> PageReader for ZstdPages<R> {
     fn get_next_page(&mut self) -> Result<Option<Page>> {
         self.compressed.get_next_page()?.map(page).transpose()
     }

@@ -3,9 +3,9 @@
 use divan::{Bencher, black_box};
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_core::model::{Carry, Scheme, parse_attitude};
-use obsdeg_ekf::Form;
+use obsdeg_ekf::CovarianceForm;
 use obsdeg_ekf::linear::covariance_pass;
-use obsdeg_evidence::crosscheck::{Experiment, Prepared};
+use obsdeg_evidence::crosscheck::{MonteCarloExperiment, PreparedExperiment};
 use obsdeg_evidence::simulation::{Conditions, Plan, RunStart};
 
 fn main() {
@@ -19,8 +19,8 @@ fn paper(truth: Truth) -> (Plan, Conditions) {
     (Plan::new(&scheme, &conditions).expect("a plan"), conditions)
 }
 
-fn experiment<'a>(plan: &'a Plan, conditions: &'a Conditions) -> Experiment<'a> {
-    Experiment { filter: plan, truth: plan, conditions, null_space: None, seed: 1 }
+fn experiment<'a>(plan: &'a Plan, conditions: &'a Conditions) -> MonteCarloExperiment<'a> {
+    MonteCarloExperiment { filter: plan, truth: plan, conditions, null_space: None, seed: 1 }
 }
 
 /// Covariance pass, truth, state pass, NEES, NIS and autocorrelations of one run.
@@ -28,14 +28,14 @@ fn experiment<'a>(plan: &'a Plan, conditions: &'a Conditions) -> Experiment<'a> 
 fn one_run_whole(bencher: Bencher<'_, '_>) {
     let (plan, conditions) = paper(Truth::Linear);
     bencher.bench(|| {
-        let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+        let prepared = PreparedExperiment::new(experiment(&plan, &conditions)).expect("prepared");
         black_box(prepared.chunk(0, 1))
     });
 }
 
 /// The covariance pass alone, in both forms.
-#[divan::bench(args = [Form::Joseph, Form::Ud])]
-fn covariance(bencher: Bencher<'_, '_>, form: &Form) {
+#[divan::bench(args = [CovarianceForm::Joseph, CovarianceForm::Ud])]
+fn covariance(bencher: Bencher<'_, '_>, form: &CovarianceForm) {
     let (plan, conditions) = paper(Truth::Linear);
     let start = RunStart::new(&plan, &conditions).expect("a start");
     bencher.bench(|| {
@@ -48,7 +48,7 @@ fn covariance(bencher: Bencher<'_, '_>, form: &Form) {
 #[divan::bench(args = [Truth::Linear, Truth::Exact])]
 fn one_more_run(bencher: Bencher<'_, '_>, truth: &Truth) {
     let (plan, conditions) = paper(*truth);
-    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    let prepared = PreparedExperiment::new(experiment(&plan, &conditions)).expect("prepared");
     bencher.bench(|| black_box(prepared.chunk(0, 1)));
 }
 
@@ -58,7 +58,7 @@ fn one_more_run(bencher: Bencher<'_, '_>, truth: &Truth) {
 fn full_attitudes(bencher: Bencher<'_, '_>, filter: &FilterKind) {
     let (plan, conditions) = paper(Truth::Exact);
     let conditions = Conditions { filter: Some(*filter), ..conditions };
-    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    let prepared = PreparedExperiment::new(experiment(&plan, &conditions)).expect("prepared");
     bencher.bench(|| black_box(prepared.chunk(0, 1)));
 }
 
@@ -67,7 +67,7 @@ fn full_attitudes(bencher: Bencher<'_, '_>, filter: &FilterKind) {
 fn monte_carlo_extended(bencher: Bencher<'_, '_>) {
     let (plan, conditions) = paper(Truth::Exact);
     let conditions = Conditions { filter: Some(FilterKind::Extended), ..conditions };
-    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    let prepared = PreparedExperiment::new(experiment(&plan, &conditions)).expect("prepared");
     bencher.bench(|| black_box(prepared.run(1000, &|_| true)));
 }
 
@@ -75,6 +75,6 @@ fn monte_carlo_extended(bencher: Bencher<'_, '_>) {
 #[divan::bench(args = [1000, 10_000])]
 fn monte_carlo(bencher: Bencher<'_, '_>, runs: usize) {
     let (plan, conditions) = paper(Truth::Linear);
-    let prepared = Prepared::new(experiment(&plan, &conditions)).expect("prepared");
+    let prepared = PreparedExperiment::new(experiment(&plan, &conditions)).expect("prepared");
     bencher.bench(|| black_box(prepared.run(runs, &|_| true)));
 }

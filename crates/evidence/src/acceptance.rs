@@ -83,7 +83,7 @@ impl AcceptanceReport {
 
 /// Unknown with the numbers that its acceptance needs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured<'a> {
+pub struct MeasuredCoefficient<'a> {
     /// Name of the unknown.
     pub name: &'a str,
     /// Unit of the numbers.
@@ -100,7 +100,7 @@ pub struct Measured<'a> {
 /// run.
 pub fn acceptance<'a>(
     stated: &Acceptance,
-    measured: impl IntoIterator<Item = Measured<'a>>,
+    measured: impl IntoIterator<Item = MeasuredCoefficient<'a>>,
     consistent: Option<bool>,
 ) -> Option<AcceptanceReport> {
     let end = |k: usize| {
@@ -117,7 +117,12 @@ pub fn acceptance<'a>(
     (!limits.is_empty()).then(|| AcceptanceReport { risk, valid: consistent != Some(false), limits })
 }
 
-fn limit(m: &Measured<'_>, [low, high]: [f64; 2], risk: f64, consistent: Option<bool>) -> AcceptanceLimit {
+fn limit(
+    m: &MeasuredCoefficient<'_>,
+    [low, high]: [f64; 2],
+    risk: f64,
+    consistent: Option<bool>,
+) -> AcceptanceLimit {
     let uncertainty = m.uncertainty.filter(|u| u.is_finite() && *u >= 0.0);
     let accepted = uncertainty.and_then(|u| inner_guard(u, high - low, risk)).map(|g| [low + g, high - g]);
     let rejected_beyond = uncertainty.map(|u| outer_guard(u, high - low, risk)).map(|w| [low - w, high + w]);
@@ -178,8 +183,13 @@ mod tests {
 
     fn of(low: f64, high: f64, risk: f64, estimate: f64, uncertainty: Option<f64>) -> AcceptanceLimit {
         let stated = Acceptance { limits: [("D_F".into(), [low, high])].into(), risk: Some(risk) };
-        let measured =
-            Measured { name: "D_FX", unit: "deg/h", estimate: Some(estimate), uncertainty, by_prior: false };
+        let measured = MeasuredCoefficient {
+            name: "D_FX",
+            unit: "deg/h",
+            estimate: Some(estimate),
+            uncertainty,
+            by_prior: false,
+        };
         acceptance(&stated, [measured], Some(true)).expect("a limit").limits.remove(0)
     }
 
@@ -215,8 +225,13 @@ mod tests {
         assert_eq!(decided(18.3), Some(Decision::Accepted));
         assert_eq!([decided(21.7), decided(-11.7)], [Some(Decision::Rejected); 2]);
         // by a prior alone nothing is accepted
-        let prior =
-            Measured { name: "D_FX", unit: "", estimate: Some(0.0), uncertainty: Some(0.1), by_prior: true };
+        let prior = MeasuredCoefficient {
+            name: "D_FX",
+            unit: "",
+            estimate: Some(0.0),
+            uncertainty: Some(0.1),
+            by_prior: true,
+        };
         let wide = Acceptance { limits: [("D_F".into(), [-9.0, 9.0])].into(), risk: None };
         assert_eq!(
             acceptance(&wide, [prior], Some(true)).expect("a limit").limits[0].decision,
@@ -226,7 +241,7 @@ mod tests {
         assert_eq!(of(-1.0, 1.0, 0.05, 0.0, Some(0.0)).decision, Some(Decision::Accepted));
         let stated = Acceptance { limits: [("D".into(), [-9.0, 9.0])].into(), risk: None };
         let at = |consistent| {
-            let m = Measured {
+            let m = MeasuredCoefficient {
                 name: "D_IX",
                 unit: "deg/h/g",
                 estimate: Some(0.0),
@@ -242,9 +257,21 @@ mod tests {
             limits: [("D".into(), [-9.0, 9.0]), ("D_IX".into(), [1.0, 2.0])].into(),
             risk: None,
         };
-        let m = Measured { name: "D_IX", unit: "", estimate: None, uncertainty: None, by_prior: false };
+        let m = MeasuredCoefficient {
+            name: "D_IX",
+            unit: "",
+            estimate: None,
+            uncertainty: None,
+            by_prior: false,
+        };
         assert_eq!(acceptance(&both, [m], None).expect("a limit").limits[0].low, 1.0);
-        let psi = Measured { name: "psi_x", unit: "deg", estimate: None, uncertainty: None, by_prior: false };
+        let psi = MeasuredCoefficient {
+            name: "psi_x",
+            unit: "deg",
+            estimate: None,
+            uncertainty: None,
+            by_prior: false,
+        };
         assert_eq!(acceptance(&both, [psi], None), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use obsdeg_core::accuracy::{Accuracy, AccuracyError};
 use obsdeg_core::degree::{Coefficient, Findings, Status, Verdict};
-use obsdeg_core::findings::{AnalysisError, CombinationFinding, Judged, SchemeFindings};
+use obsdeg_core::findings::{AnalysisError, CombinationFinding, JudgedScheme, SchemeFindings};
 use obsdeg_core::model::Platform;
 use obsdeg_core::solution::{Frame, Sparse};
 
@@ -132,7 +132,7 @@ impl Prediction {
     /// # Errors
     /// [`PredictionError`].
     pub fn new(platform: &Platform, rates: [f64; 2], seed: u64) -> Result<Self, PredictionError> {
-        let judged = Judged::new(platform, seed)?;
+        let judged = JudgedScheme::new(platform, seed)?;
         let mut solver = judged.solver(Frame::N, None);
         let found = judged.findings(&mut solver);
         let accuracy = match found.accuracy.as_ref() {

@@ -11,7 +11,7 @@ pub fn meets(sigma: f64, required: f64) -> bool {
 
 /// Unknown with its requirement and its sigma.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Claim<'a> {
+pub struct RequirementClaim<'a> {
     /// Name of the unknown.
     pub name: &'a str,
     /// Largest sigma allowed, in the unit of the unknown; an unknown without one does not count.
@@ -20,7 +20,7 @@ pub struct Claim<'a> {
     pub sigma: Result<f64, Miss>,
 }
 
-impl Claim<'_> {
+impl RequirementClaim<'_> {
     /// Margin: required over found sigma, met from 1. `None` without a requirement, or without a sigma that
     /// counts.
     pub fn margin(&self) -> Option<f64> {
@@ -122,7 +122,7 @@ pub struct Requirements {
 
 impl Requirements {
     /// Decision on `claims`, in their order.
-    pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = Claim<'a>>) -> Self {
+    pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = RequirementClaim<'a>>) -> Self {
         let mut out = Self {
             basis,
             stated: 0,
@@ -168,8 +168,8 @@ impl Requirements {
 mod tests {
     use super::*;
 
-    fn claim(name: &str, required: Option<f64>, sigma: Result<f64, Miss>) -> Claim<'_> {
-        Claim { name, required, sigma }
+    fn claim(name: &str, required: Option<f64>, sigma: Result<f64, Miss>) -> RequirementClaim<'_> {
+        RequirementClaim { name, required, sigma }
     }
 
     #[test]

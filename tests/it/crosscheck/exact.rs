@@ -2,7 +2,9 @@
 
 use obsdeg_core::model::settings::{Assignment, FilterKind, Truth};
 use obsdeg_core::model::{Carry, Scheme};
-use obsdeg_evidence::crosscheck::{CrossCheck, Experiment, FilterChange, Prepared, Statistic};
+use obsdeg_evidence::crosscheck::{
+    CrossCheck, FilterChange, MonteCarloExperiment, PreparedExperiment, Statistic,
+};
 use obsdeg_evidence::simulation::{Conditions, Plan};
 use obsdeg_report::{Format, TerminalLayout};
 
@@ -13,9 +15,14 @@ use crate::schemes::{S6, paper, scheme};
 fn statistics(scheme: &Scheme, conditions: &Conditions, runs: usize) -> (FilterKind, Statistic, Statistic) {
     let conditions = Conditions { truth: Truth::Exact, ..conditions.clone() };
     let plan = Plan::new(scheme, &conditions).expect("a plan");
-    let experiment =
-        Experiment { filter: &plan, truth: &plan, conditions: &conditions, null_space: None, seed: 1 };
-    let prepared = Prepared::new(experiment).expect("prepared");
+    let experiment = MonteCarloExperiment {
+        filter: &plan,
+        truth: &plan,
+        conditions: &conditions,
+        null_space: None,
+        seed: 1,
+    };
+    let prepared = PreparedExperiment::new(experiment).expect("prepared");
     let totals = prepared.run(runs, &|_| true);
     assert_eq!(totals.unsettled, 0);
     let [anees, nis] = &prepared.statistics(&totals)[..] else { panic!("ANEES and NIS") };

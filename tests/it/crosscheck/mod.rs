@@ -11,7 +11,8 @@ use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, Unknowns};
 use obsdeg_ekf::SquareRootInformation;
 use obsdeg_evidence::crosscheck::{
-    Agreement, CrossCheck, CrossCheckOptions, Experiment, FilterChange, Prepared, crosscheck,
+    Agreement, CrossCheck, CrossCheckOptions, FilterChange, MonteCarloExperiment, PreparedExperiment,
+    crosscheck,
 };
 use obsdeg_evidence::simulation::{Conditions, Plan, batch};
 use obsdeg_report::{Format, TerminalLayout};
@@ -233,9 +234,14 @@ fn the_control_is_at_a_latitude_far_away() {
 fn whiteness_of_right_filters_is_even() {
     let conditions = Conditions { dwell_s: 100.0, ..Conditions::default() };
     let plan = Plan::new(&paper(Carry::Inertial), &conditions).expect("a plan");
-    let experiment =
-        Experiment { filter: &plan, truth: &plan, conditions: &conditions, null_space: None, seed: 3 };
-    let prepared = Prepared::new(experiment).expect("prepared");
+    let experiment = MonteCarloExperiment {
+        filter: &plan,
+        truth: &plan,
+        conditions: &conditions,
+        null_space: None,
+        seed: 3,
+    };
+    let prepared = PreparedExperiment::new(experiment).expect("prepared");
     let p: Vec<f64> = (0..500).map(|k| prepared.whiteness(&prepared.chunk(10 * k, 10 * k + 10))).collect();
     let (mean, small) = (p.iter().sum::<f64>() / 500.0, p.iter().filter(|p| **p < 0.01).count());
     assert!((mean - 0.5).abs() < 0.05 && (1..=12).contains(&small), "{mean} {small}");
@@ -243,9 +249,14 @@ fn whiteness_of_right_filters_is_even() {
     let short = Conditions { dwell_s: 10.0, ..conditions };
     for attitudes in [&["0,0,0"][..], &["0,0,0", "180,0,0"]] {
         let plan = Plan::new(&scheme(attitudes, Carry::Inertial), &short).expect("a plan");
-        let experiment =
-            Experiment { filter: &plan, truth: &plan, conditions: &short, null_space: None, seed: 3 };
-        let prepared = Prepared::new(experiment).expect("prepared");
+        let experiment = MonteCarloExperiment {
+            filter: &plan,
+            truth: &plan,
+            conditions: &short,
+            null_space: None,
+            seed: 3,
+        };
+        let prepared = PreparedExperiment::new(experiment).expect("prepared");
         assert!((0.001..=1.0).contains(&prepared.whiteness(&prepared.chunk(0, 50))));
     }
 }
@@ -255,9 +266,14 @@ fn whiteness_of_right_filters_is_even() {
 fn threads_do_not_change_the_sums() {
     let conditions = Conditions::default();
     let plan = Plan::new(&paper(Carry::Platform), &conditions).expect("a plan");
-    let experiment =
-        || Experiment { filter: &plan, truth: &plan, conditions: &conditions, null_space: None, seed: 7 };
-    let prepared = Prepared::new(experiment()).expect("prepared");
+    let experiment = || MonteCarloExperiment {
+        filter: &plan,
+        truth: &plan,
+        conditions: &conditions,
+        null_space: None,
+        seed: 7,
+    };
+    let prepared = PreparedExperiment::new(experiment()).expect("prepared");
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         let heard = std::sync::atomic::AtomicUsize::new(0);

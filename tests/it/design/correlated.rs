@@ -189,8 +189,10 @@ fn sigmas_are_those_of_a_filter_with_biases() {
             scheme.simulation.slew_rate_deg_s = slew;
             let plan = Plan::new(&scheme, &conditions).expect("a plan");
             assert_eq!(plan.states(), plan.unknowns() + 3);
-            let prior =
-                RunStart::new(&plan, &conditions).expect("a start").covariance(CovarianceForm::Ud).expect("a prior");
+            let prior = RunStart::new(&plan, &conditions)
+                .expect("a start")
+                .covariance(CovarianceForm::Ud)
+                .expect("a prior");
             let mut last = Vec::new();
             covariance_pass(&plan.stages, prior, |_, p| last = p.sigmas()).expect("a pass");
             let count = plan.platform.coefficients();

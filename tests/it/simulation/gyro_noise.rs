@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use obsdeg_core::model::settings::{FilterKind, Settings, Truth};
 use obsdeg_core::model::{PerGyro, Rotation};
-use obsdeg_evidence::crosscheck::{Experiment, Prepared, Statistic};
+use obsdeg_evidence::crosscheck::{MonteCarloExperiment, PreparedExperiment, Statistic};
 use obsdeg_evidence::simulation::GyroNoise;
 
 use super::*;
@@ -128,9 +128,14 @@ const RUNS: [usize; 2] = [60, 200];
 fn statistics(filter: &Conditions, truth: &Conditions, scheme: &Scheme, runs: usize) -> Vec<Statistic> {
     let plan = |c: &Conditions| Plan::new(scheme, c).expect("a plan");
     let (filter_plan, truth_plan) = (plan(filter), plan(truth));
-    let experiment =
-        Experiment { filter: &filter_plan, truth: &truth_plan, conditions: truth, null_space: None, seed: 5 };
-    let prepared = Prepared::new(experiment).expect("prepared");
+    let experiment = MonteCarloExperiment {
+        filter: &filter_plan,
+        truth: &truth_plan,
+        conditions: truth,
+        null_space: None,
+        seed: 5,
+    };
+    let prepared = PreparedExperiment::new(experiment).expect("prepared");
     prepared.statistics(&prepared.run(runs, &|_| true))
 }
 

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use obsdeg_core::model::Carry;
 use obsdeg_core::model::settings::Truth;
 use obsdeg_ekf::Update;
-use obsdeg_evidence::simulation::{Conditions, Extended, Noise, Plan, RunStart, TruthModel};
+use obsdeg_evidence::simulation::{Conditions, ExtendedFilter, Noise, Plan, RunStart, TruthModel};
 
 use crate::schemes::{paper, scheme};
 
@@ -119,7 +119,7 @@ fn an_independent_filter_has_the_same_estimates() {
                 z.extend(now);
             }
         }
-        let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
+        let filter = ExtendedFilter::new(&plan, &conditions, Update::default()).expect("coefficients");
         let mut last = Vec::new();
         let ended = filter.run(&start, &z, |_, x, _, _| last = x.unknowns()).expect("finite");
 

@@ -62,7 +62,7 @@ fn sensor(unit: &str, gravity: f64) -> Option<(SensorKind, f64)> {
 
 /// Columns of sensors: index, kind, scale.
 fn sensors(record: &Record, options: &NoiseOptions) -> Result<Vec<(usize, SensorKind, f64)>, NoiseError> {
-    let of = |(i, c): (usize, &crate::record::Column)| {
+    let of = |(i, c): (usize, &crate::record::RecordColumn)| {
         let (kind, scale) = sensor(c.unit.as_deref()?, options.gravity_m_s2)?;
         Some((i, kind, scale * c.count))
     };

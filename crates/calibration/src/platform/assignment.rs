@@ -13,9 +13,9 @@ use super::mistaken::Mistaken;
 use super::placed::{By, Reading, channel_name};
 use super::record_columns::{ObservedColumns, RecordColumns};
 use super::timeline::Intervals;
-use crate::bins::{Bin, Binner, CHANNELS, FEWEST, Sample, Spike};
+use crate::bins::{Bin, BinSample, Binner, CHANNELS, FEWEST, Spike};
 use crate::levels;
-use crate::record::{Record, Row};
+use crate::record::{Record, RecordRow};
 use crate::still::{DecidedSample, Detector};
 
 /// Ratio to the interval before from which an interval is a gap, in which increments may be lost.
@@ -32,7 +32,7 @@ const ROUNDING_S: f64 = 1e-6;
 /// where one position follows another directly.
 fn at_time(plan: &Plan, t: f64, rounding: f64) -> Option<usize> {
     let slew = |k: usize| plan.segments.get(k).is_none_or(|s| matches!(s.kind, SegmentKind::Slew(_)));
-    let within = |(k, s): &(usize, &obsdeg_evidence::simulation::Segment)| {
+    let within = |(k, s): &(usize, &obsdeg_evidence::simulation::PlanSegment)| {
         let late = if slew(*k) || slew(k + 1) { 0.0 } else { rounding };
         t > s.start_s - 1e-9 && t <= s.start_s + s.dt * s.steps as f64 + late.max(1e-9)
     };
@@ -147,7 +147,12 @@ impl<'a> SampleAssignment<'a> {
     }
 
     /// Position of a row.
-    fn position(&self, row: &Row<'_>, t: f64, dt: Option<f64>) -> Result<Option<usize>, CalibrationError> {
+    fn position(
+        &self,
+        row: &RecordRow<'_>,
+        t: f64,
+        dt: Option<f64>,
+    ) -> Result<Option<usize>, CalibrationError> {
         let positions = &self.plan.platform.scheme().positions;
         match self.out.by {
             By::Timeline | By::Both | By::Static => Ok(at_time(self.plan, t, ROUNDED * dt.unwrap_or(0.0))),
@@ -182,7 +187,7 @@ impl<'a> SampleAssignment<'a> {
     ///
     /// # Errors
     /// [`CalibrationError`].
-    pub(super) fn take(&mut self, row: &Row<'_>) -> Result<(), CalibrationError> {
+    pub(super) fn take(&mut self, row: &RecordRow<'_>) -> Result<(), CalibrationError> {
         let Some(time) = row.numbers[0] else { return Ok(()) };
         if self.out.samples == 0 {
             self.out.span.0 = time;
@@ -295,7 +300,7 @@ impl<'a> SampleAssignment<'a> {
         // a mean belongs to the middle of its interval
         let t = t - dt.filter(|_| self.layout.increments).map_or(0.0, |dt| dt / 2.0);
         let spikes = self.out.spikes.len();
-        let bins = self.binner.push(Sample { line, t, z, sigma, temperature }, &mut self.out.spikes);
+        let bins = self.binner.push(BinSample { line, t, z, sigma, temperature }, &mut self.out.spikes);
         for bin in bins {
             self.put_bin(p, bin, spikes);
         }

@@ -9,7 +9,7 @@ const TOLD: f64 = 4.0;
 
 /// Straight line of the times of a record over those of the scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Line {
+pub(crate) struct ClockLine {
     /// Time of the record at time 0 of the scheme, in s.
     pub at_zero: f64,
     /// Excess rate of the record's clock, as a fraction.
@@ -21,7 +21,7 @@ pub(crate) struct Line {
 }
 
 /// Least-squares line through points (scheme, record) in s; `None` for fewer than three points.
-pub(crate) fn line(points: &[(f64, f64)]) -> Option<Line> {
+pub(crate) fn line(points: &[(f64, f64)]) -> Option<ClockLine> {
     let n = points.len() as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
     let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
@@ -32,7 +32,7 @@ pub(crate) fn line(points: &[(f64, f64)]) -> Option<Line> {
     let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / along;
     let at_zero = y - slope * x;
     let off = |p: &(f64, f64)| (p.1 - at_zero - slope * p.0).abs();
-    Some(Line {
+    Some(ClockLine {
         at_zero,
         fast: slope - 1.0,
         within: points.iter().map(off).fold(0.0, f64::max),

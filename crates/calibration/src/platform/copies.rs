@@ -4,7 +4,7 @@
 //! Errors that the model lacks are in all records of a platform, but their effects are smooth. So differences
 //! of differences of neighbouring residuals are compared.
 
-use super::diagnose::{MeasurementResidual, Parts};
+use super::diagnose::{AnswerData, MeasurementResidual};
 use crate::answer::Finding;
 
 /// Fewest measurements of two records at the same times of the scheme.
@@ -22,7 +22,7 @@ type Normalised = ((usize, usize), f64, f64);
 /// Channel and position, and the residuals of two records there.
 type Pair = ((usize, usize), f64, f64);
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Measurements of run `r`, by channel, position and time.
     fn normalised(&self, r: usize) -> Vec<Normalised> {
         let run = &self.problem.runs[r];

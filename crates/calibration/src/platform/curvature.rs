@@ -19,9 +19,9 @@ use obsdeg_ekf::Manifold;
 use obsdeg_evidence::simulation::{Noise, PlatformState};
 
 use super::CalibrationError;
-use super::estimate::{Estimate, Problem};
-use super::posterior::{Sample, normal_pairs};
-use crate::least_squares::{Information, Linearised};
+use super::estimate::{PlatformEstimate, PlatformProblem};
+use super::posterior::{PosteriorSample, normal_pairs};
+use crate::least_squares::{Linearised, StartInformation};
 
 /// Number of the longest axes of the posterior that are tried.
 const AXES: usize = 8;
@@ -48,7 +48,7 @@ const WORK: f64 = 2e9;
 
 /// Curvature of an estimate, with mean and covariance of the posterior where it matters.
 #[derive(Debug, Clone)]
-pub(crate) struct Bent {
+pub(crate) struct CurvatureResult {
     /// Curvature in sigma; infinite where the run cannot be followed along an axis, or another minimum is
     /// nearly as low.
     pub kappa: f64,
@@ -59,7 +59,7 @@ pub(crate) struct Bent {
     pub found: Option<(DVector<f64>, DMatrix<f64>)>,
 }
 
-impl Bent {
+impl CurvatureResult {
     /// True if no covariance describes the errors of the estimates.
     pub(super) fn leaves_open(&self) -> bool {
         self.kappa.is_nan() || self.kappa > BENT && self.found.is_none()
@@ -67,7 +67,7 @@ impl Bent {
 }
 
 /// Weights of samples, with sum one, and their effective number (Kish).
-fn weighed(all: &[Sample]) -> (Vec<f64>, f64) {
+fn weighed(all: &[PosteriorSample]) -> (Vec<f64>, f64) {
     let most = all.iter().map(|s| s.weight).fold(f64::NEG_INFINITY, f64::max);
     let own: Vec<f64> = all.iter().map(|s| (s.weight - most).exp()).collect();
     let sum: f64 = own.iter().sum();
@@ -75,14 +75,18 @@ fn weighed(all: &[Sample]) -> (Vec<f64>, f64) {
     (own.iter().map(|w| w / sum).collect(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
 }
 
-impl Problem<'_> {
+impl PlatformProblem<'_> {
     /// Curvature of an estimate.
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite.
-    pub(super) fn bent(&self, estimate: &Estimate, seed: u64) -> Result<Bent, CalibrationError> {
+    pub(super) fn bent(
+        &self,
+        estimate: &PlatformEstimate,
+        seed: u64,
+    ) -> Result<CurvatureResult, CalibrationError> {
         let kappa = if estimate.rivals > 0 { f64::INFINITY } else { self.kappa(estimate)? };
-        let mut out = Bent { kappa, samples: 0, failed: 0, found: None };
+        let mut out = CurvatureResult { kappa, samples: 0, failed: 0, found: None };
         let n = self.unknowns.n;
         let wanted = SAMPLES.0.max(SAMPLES.1 * n);
         let bins: usize = self.runs.iter().map(|run| run.len()).sum();
@@ -92,7 +96,7 @@ impl Problem<'_> {
         }
         let Some(equation) = self.equation(estimate)? else { return Ok(out) };
         let mut noise = Noise::new(seed, 0);
-        let mut all: Vec<Sample> = Vec::with_capacity(wanted);
+        let mut all: Vec<PosteriorSample> = Vec::with_capacity(wanted);
         let (mut weights, mut effective) = (Vec::new(), 0.0);
         while out.samples == 0 || (effective < MOSTLY * wanted as f64 && out.samples < MORE * wanted) {
             let Some(half) = normal_pairs(n, wanted / 2, &mut noise) else { return Ok(out) };
@@ -128,7 +132,7 @@ impl Problem<'_> {
     }
 
     /// Longest axes of the posterior that can cause curvature, one standard deviation long.
-    pub(super) fn axes(&self, estimate: &Estimate) -> Vec<DVector<f64>> {
+    pub(super) fn axes(&self, estimate: &PlatformEstimate) -> Vec<DVector<f64>> {
         let (n, prior) = (self.unknowns.n, &self.unknowns.prior);
         let root = &estimate.solution.inverse_root;
         let scaled = DMatrix::from_fn(n, root.ncols(), |i, j| root[(i, j)] / prior[i]);
@@ -146,7 +150,7 @@ impl Problem<'_> {
     }
 
     /// Largest curvature along these axes, in both directions.
-    pub(super) fn kappa(&self, estimate: &Estimate) -> Result<f64, CalibrationError> {
+    pub(super) fn kappa(&self, estimate: &PlatformEstimate) -> Result<f64, CalibrationError> {
         let mut kappa: f64 = 0.0;
         for axis in self.axes(estimate) {
             for a in [axis.clone(), -axis] {
@@ -157,7 +161,7 @@ impl Problem<'_> {
     }
 
     /// Length in sigma of the residuals beyond the linear model, for a start moved by `a`.
-    fn bend(&self, estimate: &Estimate, a: &DVector<f64>) -> Result<f64, CalibrationError> {
+    fn bend(&self, estimate: &PlatformEstimate, a: &DVector<f64>) -> Result<f64, CalibrationError> {
         let x = self.moved(&estimate.at.x, a);
         let mut sum = 0.0;
         for (r, (own, (run, _))) in self.runs.iter().zip(&estimate.at.runs).enumerate() {
@@ -173,7 +177,7 @@ impl Problem<'_> {
             let beside = there.residuals.iter().zip(&run.residuals).zip(&seen);
             let residuals = beside.map(|((there, here), seen)| there - here + seen).collect();
             let bend = Linearised { residuals, ..run.clone() };
-            sum += Information::of(&bend).map_or(f64::INFINITY, |i| i.at_zero());
+            sum += StartInformation::of(&bend).map_or(f64::INFINITY, |i| i.at_zero());
         }
         Ok(sum.sqrt())
     }

@@ -9,26 +9,26 @@ use obsdeg_core::degree::Status;
 use obsdeg_core::model::settings::{Assignment, concerns};
 use obsdeg_core::model::{AZIMUTH, Platform, Scheme};
 use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
-use obsdeg_ekf::{Covariance, EkfError, Form};
-use obsdeg_evidence::acceptance::{Measured, acceptance};
+use obsdeg_ekf::{Covariance, CovarianceForm, EkfError};
+use obsdeg_evidence::acceptance::{MeasuredCoefficient, acceptance};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
-use obsdeg_evidence::requirements::{Basis, Claim, Miss, Requirements};
+use obsdeg_evidence::requirements::{Basis, Miss, RequirementClaim, Requirements};
 use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
-use super::curvature::Bent;
-use super::estimate::{At, BOX, Estimate, Problem, TIGHT, WEAK};
+use super::curvature::CurvatureResult;
+use super::estimate::{BOX, LinearisedRuns, PlatformEstimate, PlatformProblem, TIGHT, WEAK};
 use super::jump::Jump;
 use super::offset::{Later, Offset};
 use super::placed::channel_name;
-use super::run::Key;
+use super::run::MeasurementKey;
 use super::suspects::{FamilyChange, Outside, omitted};
 use super::{CalibrationError, Options};
 use crate::answer::{
     Assumed, Calibration, ChannelFit, CovarianceTable, Curvature, Estimated, FamilyLimit, LAYOUT, Moved,
     PositionFit, RecordReport, SecondPath,
 };
-use crate::least_squares::{Information, Linearised, Rows, Solution, State};
+use crate::least_squares::{LeastSquaresSolution, Linearised, RunState, StackedRows, StartInformation};
 use crate::setup::{self, Setup};
 
 /// Factor by which the prior of the filter is wider than that of the scheme.
@@ -42,7 +42,7 @@ const LOST: f64 = 1e3;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MeasurementResidual {
     pub run: usize,
-    pub key: Key,
+    pub key: MeasurementKey,
     /// Measurement minus estimate.
     pub residual: f64,
     /// Variance of the measurement as given.
@@ -76,7 +76,7 @@ pub(crate) struct Diagnosed {
 
 /// Prior standard deviations of the states of run `r`, wider than those of the scheme. Random biases have
 /// priors of their own.
-fn wide_prior(problem: &Problem<'_>, r: usize) -> Vec<f64> {
+fn wide_prior(problem: &PlatformProblem<'_>, r: usize) -> Vec<f64> {
     let own = &problem.runs[r].plan;
     let wide =
         |(s, &i): (usize, &usize)| problem.unknowns.prior[i] * if s < own.unknowns() { WIDE } else { 1.0 };
@@ -103,7 +103,7 @@ impl FilterPath {
             z.copy_from_slice(&run.residuals[first..first + z.len()]);
             first += z.len();
         };
-        let covariance = Covariance::new("P0", &p0, Form::Ud)?;
+        let covariance = Covariance::new("P0", &p0, CovarianceForm::Ud)?;
         let steps = run.stages.len();
         let gains = filter_pass(&run.stages, covariance, &mut delta, &mut measure, |step, x, p, w| {
             whitened.extend_from_slice(w);
@@ -122,8 +122,8 @@ impl Diagnosed {
     /// # Errors
     /// [`EkfError`].
     pub(crate) fn of(
-        problem: &Problem<'_>,
-        estimate: &Estimate,
+        problem: &PlatformProblem<'_>,
+        estimate: &PlatformEstimate,
         prediction: &Prediction,
     ) -> Result<Self, EkfError> {
         let mut out = Self {
@@ -142,7 +142,7 @@ impl Diagnosed {
     }
 
     /// Adds the residuals of run `r`.
-    fn add(&mut self, r: usize, run: &Linearised, keys: &[Key], path: &FilterPath) {
+    fn add(&mut self, r: usize, run: &Linearised, keys: &[MeasurementKey], path: &FilterPath) {
         let variances = run.stages.iter().flat_map(|s| &s.outputs).map(|o| o.r);
         let each = path.smoothed.left_out.iter().zip(variances).zip(keys).zip(&path.whitened);
         for (((left, r_of), key), innovation) in each {
@@ -162,18 +162,18 @@ impl Diagnosed {
     fn compare(
         &mut self,
         run: &Linearised,
-        information: &Information,
+        information: &StartInformation,
         (prior, path): (&[f64], &FilterPath),
         prediction: &Prediction,
     ) -> Result<(), EkfError> {
         let n = prior.len();
-        let mut rows = Rows::new(n);
+        let mut rows = StackedRows::new(n);
         rows.add(&information.root, &information.right);
         let pull = DVector::from_iterator(n, prior.iter().map(|s| 1.0 / s));
         rows.add(&DMatrix::from_diagonal(&pull), &DVector::zeros(n));
         let batch = rows.solve()?;
         self.alone.push(information.left + batch.left);
-        let start = State { correction: batch.x.clone(), root: batch.inverse_root.clone() };
+        let start = RunState { correction: batch.x.clone(), root: batch.inverse_root.clone() };
         let states = information.states(run, start)?;
         if let (Some((x, sigmas)), Some(last)) = (&path.end, states.last()) {
             let determined = |s: usize| prediction.unknowns.get(s).is_some_and(|u| u.determined_at_end);
@@ -203,7 +203,7 @@ impl Diagnosed {
     }
 
     /// Measurements farther off than `gate`, in units of the usual size of residuals if that exceeds one.
-    pub(crate) fn beyond(&self, gate: f64) -> Vec<(usize, Key)> {
+    pub(crate) fn beyond(&self, gate: f64) -> Vec<(usize, MeasurementKey)> {
         let mut sizes: Vec<f64> = self.all.iter().map(|l| l.normalised.abs()).collect();
         if sizes.is_empty() {
             return Vec::new();
@@ -216,17 +216,17 @@ impl Diagnosed {
 }
 
 /// Data of an answer.
-pub(crate) struct Parts<'a> {
+pub(crate) struct AnswerData<'a> {
     pub scheme: &'a Scheme,
     pub conditions: &'a Conditions,
     pub options: &'a Options,
     pub planned: &'a Plan,
     pub prediction: &'a Prediction,
-    pub problem: &'a Problem<'a>,
-    pub estimate: &'a Estimate,
+    pub problem: &'a PlatformProblem<'a>,
+    pub estimate: &'a PlatformEstimate,
     /// Last step by the linear model: the covariance of the estimate may be that of samples.
-    pub linear: &'a Solution,
-    pub bent: &'a Bent,
+    pub linear: &'a LeastSquaresSolution,
+    pub bent: &'a CurvatureResult,
     pub found: &'a Diagnosed,
     /// Beginning of the scheme by run; `None` where it was not estimated.
     pub offsets: &'a [Option<Offset>],
@@ -241,7 +241,7 @@ pub(crate) struct Parts<'a> {
 }
 
 /// A functional that is reported.
-pub(super) struct Asked {
+pub(super) struct ReportedFunctional {
     name: String,
     unit: &'static str,
     status: Status,
@@ -264,27 +264,31 @@ struct ReportedSolutions {
     /// Values of the unknowns, in SI.
     values: DVector<f64>,
     /// Solution with the prior of the scheme on everything.
-    with_prior: Solution,
+    with_prior: LeastSquaresSolution,
     /// Solution in which the undetermined directions count as known.
-    tight: Solution,
+    tight: LeastSquaresSolution,
     /// Solution with the platform at the attitudes of the scheme.
-    planned: Solution,
+    planned: LeastSquaresSolution,
     /// Rows of the prior calibration, which no factor changes.
     known: DMatrix<f64>,
     /// Factor on the standard deviations of the measurements by the fit, at least one.
     factor: f64,
 }
 
-impl Asked {
+impl ReportedFunctional {
     /// True if there is an estimate with a sigma.
     fn stands(&self) -> bool {
         self.determined && !self.left_open
     }
 }
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Reported functionals: unknowns, then combinations; those with psi once per record.
-    fn asked(&self, weaker: &Solution, at_rest: &[PlatformState]) -> (Vec<Asked>, Vec<Asked>) {
+    fn asked(
+        &self,
+        weaker: &LeastSquaresSolution,
+        at_rest: &[PlatformState],
+    ) -> (Vec<ReportedFunctional>, Vec<ReportedFunctional>) {
         let (names, units) = (self.planned.platform.names(), self.planned.platform.units());
         let psi = self.planned.unknowns() - self.planned.platform.coefficients();
         let runs = self.problem.runs.len();
@@ -300,7 +304,7 @@ impl Parts<'_> {
                     let from_prior =
                         !verdict.2 && self.has_prior() && !self.problem.unknowns.is_open(&on(terms));
                     let determined = (verdict.2 || from_prior) && wide <= DETERMINED * narrow;
-                    Asked {
+                    ReportedFunctional {
                         name: if many { format!("{name} (record {})", r + 1) } else { name.into() },
                         unit: units[terms[0].0],
                         status: verdict.0,
@@ -338,7 +342,7 @@ impl Parts<'_> {
     }
 
     /// Estimate with the prior of the scheme on everything.
-    fn with_prior(&self) -> Result<Solution, EkfError> {
+    fn with_prior(&self) -> Result<LeastSquaresSolution, EkfError> {
         self.problem.step_with_prior(&self.estimate.at)
     }
 
@@ -354,7 +358,7 @@ impl Parts<'_> {
         if !all().any(|a| a.determined) {
             return Err(CalibrationError::Nothing);
         }
-        let determined: Vec<&Asked> = all().filter(|a| a.stands()).collect();
+        let determined: Vec<&ReportedFunctional> = all().filter(|a| a.stands()).collect();
         let fit = self.fit(&unknowns, &combinations);
         let by = self.solutions(at_rest, fit.factor.max(1.0))?;
         let covariance = self.covariance(&determined, &by);
@@ -414,7 +418,7 @@ impl Parts<'_> {
             None => problem.values(&self.estimate.at.x),
         };
         let tight = problem.step_held(&self.estimate.at, TIGHT)?;
-        let planned: At = problem.at(at_rest)?;
+        let planned: LinearisedRuns = problem.at(at_rest)?;
         let planned = problem.step(&planned, WEAK)?;
         let none = || DMatrix::zeros(0, problem.unknowns.n);
         let known = problem.known.as_ref().map_or_else(none, |(rows, _)| rows.clone());
@@ -422,13 +426,13 @@ impl Parts<'_> {
     }
 
     /// Covariance of two functionals with the noise that the fit has, in their shown units.
-    fn between(&self, a: &Asked, b: &Asked, by: &ReportedSolutions) -> f64 {
+    fn between(&self, a: &ReportedFunctional, b: &ReportedFunctional, by: &ReportedSolutions) -> f64 {
         let covariance = self.estimate.solution.covariance_with(&a.local, &b.local, by.factor, &by.known);
         covariance / si_per_shown(a.unit) / si_per_shown(b.unit)
     }
 
     /// Estimate of a functional.
-    fn estimated(&self, a: &Asked, by: &ReportedSolutions) -> Estimated {
+    fn estimated(&self, a: &ReportedFunctional, by: &ReportedSolutions) -> Estimated {
         let data_alone = self.problem.unknowns.stated.is_empty();
         let scale = si_per_shown(a.unit);
         let there = |x: f64| a.stands().then_some(x);
@@ -458,18 +462,19 @@ impl Parts<'_> {
     }
 
     /// Covariance of the determined functionals that do not follow from the others.
-    fn covariance(&self, determined: &[&Asked], by: &ReportedSolutions) -> CovarianceTable {
+    fn covariance(&self, determined: &[&ReportedFunctional], by: &ReportedSolutions) -> CovarianceTable {
         let solution = &self.estimate.solution;
-        let row = |a: &Asked| {
+        let row = |a: &ReportedFunctional| {
             let zero = nalgebra::RowDVector::zeros(solution.inverse_root.ncols());
             let scale = si_per_shown(a.unit);
             a.local.iter().fold(zero, |sum, &(i, k)| sum + solution.inverse_root.row(i) * (k / scale))
         };
-        let single = |a: &Asked| a.terms.len() == 1;
-        let follows = |a: &Asked| {
+        let single = |a: &ReportedFunctional| a.terms.len() == 1;
+        let follows = |a: &ReportedFunctional| {
             a.terms.iter().all(|(i, _)| determined.iter().any(|d| single(d) && d.terms[0].0 == *i))
         };
-        let free: Vec<&Asked> = determined.iter().copied().filter(|a| single(a) || !follows(a)).collect();
+        let free: Vec<&ReportedFunctional> =
+            determined.iter().copied().filter(|a| single(a) || !follows(a)).collect();
         let of: Vec<_> = free.iter().map(|a| row(a)).collect();
         CovarianceTable {
             names: free.iter().map(|a| a.name.clone()).collect(),
@@ -498,7 +503,7 @@ impl Parts<'_> {
             e.total = total(e, outside);
         }
         out.requirements = self.requirements(&out.quantities, outside);
-        let measured = out.quantities.iter().map(|e| Measured {
+        let measured = out.quantities.iter().map(|e| MeasuredCoefficient {
             name: &e.name,
             unit: &e.unit,
             estimate: e.estimate,
@@ -522,7 +527,7 @@ impl Parts<'_> {
     /// Outcome of the requirements on coefficients, with the contributions of a bench and of a suspected
     /// error; `None` where no requirement is stated.
     fn requirements(&self, quantities: &[Estimated], outside: &Outside) -> Option<Requirements> {
-        let claims = quantities.iter().map(|e| Claim {
+        let claims = quantities.iter().map(|e| RequirementClaim {
             name: &e.name,
             required: e.required_sigma,
             sigma: total(e, outside).ok_or(Miss::NotObservable),
@@ -537,7 +542,7 @@ impl Parts<'_> {
         Some(out).filter(|r| r.stated > 0)
     }
 
-    fn positions(&self, determined: &[&Asked]) -> Result<Vec<PositionFit>, EkfError> {
+    fn positions(&self, determined: &[&ReportedFunctional]) -> Result<Vec<PositionFit>, EkfError> {
         let names = &self.scheme.positions;
         let mut out = Vec::new();
         for (r, run) in self.problem.runs.iter().enumerate() {
@@ -569,11 +574,11 @@ impl Parts<'_> {
         &self,
         r: usize,
         p: usize,
-        determined: &[&Asked],
+        determined: &[&ReportedFunctional],
     ) -> Result<(Option<Moved>, Vec<String>), EkfError> {
-        let (run, keys): &(Linearised, Vec<Key>) = &self.estimate.at.runs[r];
+        let (run, keys): &(Linearised, Vec<MeasurementKey>) = &self.estimate.at.runs[r];
         let keep: Vec<bool> = keys.iter().map(|k| k.position != p).collect();
-        let rest = Information::of(&run.without(&keep))?;
+        let rest = StartInformation::of(&run.without(&keep))?;
         let solution = self.problem.step_with(&self.estimate.at, WEAK, Some((r, &rest)))?;
         let (mut moves, mut loses): (Option<Moved>, _) = (None, Vec::new());
         for a in determined {
@@ -617,7 +622,7 @@ impl Parts<'_> {
     }
 
     fn records(&self) -> Vec<RecordReport> {
-        let of = |(r, run): (usize, &super::run::Run)| RecordReport {
+        let of = |(r, run): (usize, &super::run::RecordedRun)| RecordReport {
             clock: self.clock(r),
             name: run.reading.name.clone(),
             samples: run.reading.samples,
@@ -665,7 +670,7 @@ impl Parts<'_> {
             .collect()
     }
 
-    fn assumed(&self, unknowns: &[Asked]) -> Assumed {
+    fn assumed(&self, unknowns: &[ReportedFunctional]) -> Assumed {
         let c = self.conditions;
         let open = unknowns.iter().filter(|a| !a.determined);
         let held = open.map(|a| {

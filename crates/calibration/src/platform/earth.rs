@@ -12,14 +12,14 @@ use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
 use super::clock::bounds;
-use super::diagnose::Parts;
-use super::estimate::{Problem, WEAK};
+use super::diagnose::AnswerData;
+use super::estimate::{PlatformProblem, WEAK};
 use super::placed::{By, Reading, TOLERANCE};
-use super::run::Run;
+use super::run::RecordedRun;
 use super::timeline::{narrow, slews};
 use super::{CalibrationError, STRICT};
 use crate::answer::{Clock, ClockRate};
-use crate::least_squares::Information;
+use crate::least_squares::StartInformation;
 
 /// Relative change of the rates for the finite differences.
 const MOVED: f64 = 0.005;
@@ -48,7 +48,7 @@ struct ByChanges {
     pub late_s: f64,
 }
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Clock of run `r`: its offset, and its rate in three ways.
     pub(super) fn clock(&self, r: usize) -> Clock {
         let reading = &self.problem.runs[r].reading;
@@ -65,10 +65,15 @@ impl Parts<'_> {
     }
 
     /// Sum of squares of all runs, with `instead` in place of run `r`, and all unknowns free.
-    fn left_with(&self, r: usize, instead: &Run, conditions: &Conditions) -> Result<f64, CalibrationError> {
+    fn left_with(
+        &self,
+        r: usize,
+        instead: &RecordedRun,
+        conditions: &Conditions,
+    ) -> Result<f64, CalibrationError> {
         let at = &self.estimate.at;
         let (along, _) = instead.along(conditions, &self.problem.sigmas, &at.x[r])?;
-        let information = Information::of(&along)?;
+        let information = StartInformation::of(&along)?;
         Ok(information.left + self.problem.step_with(at, WEAK, Some((r, &information)))?.left)
     }
 
@@ -97,7 +102,7 @@ impl Parts<'_> {
         let step = MOVED_ROWS * interval;
         let left = |late: f64, stretched: f64| {
             let reading = own.reading.later(late * step).stretched(stretched * step / last);
-            let mut run = Run::new(reading, self.scheme, self.planned, self.problem.conditions)?;
+            let mut run = RecordedRun::new(reading, self.scheme, self.planned, self.problem.conditions)?;
             run.counts.clone_from(&own.counts);
             self.left_with(r, &run, self.problem.conditions)
         };
@@ -175,7 +180,12 @@ impl Parts<'_> {
     }
 
     /// Run and conditions in which the earth and the platform turn `1 + by` times as fast as in the scheme.
-    fn at_rate(&self, own: &Run, reading: &Reading, by: f64) -> Result<(Conditions, Run), CalibrationError> {
+    fn at_rate(
+        &self,
+        own: &RecordedRun,
+        reading: &Reading,
+        by: f64,
+    ) -> Result<(Conditions, RecordedRun), CalibrationError> {
         let rate = |rate: &mut Option<f64>| rate.iter_mut().for_each(|rate| *rate *= 1.0 + by);
         let (mut scheme, mut conditions) = (self.scheme.clone(), self.problem.conditions.clone());
         rate(&mut conditions.slew_rate_deg_s);
@@ -186,7 +196,7 @@ impl Parts<'_> {
         if reading.ends_open && reading.by_durations(self.planned).is_some() {
             narrow(&mut reading.stays, self.planned, &slews(&planned));
         }
-        let mut run = Run::new(reading, &scheme, &planned, &conditions)?;
+        let mut run = RecordedRun::new(reading, &scheme, &planned, &conditions)?;
         run.counts.clone_from(&own.counts);
         run.plan.point.w_n *= 1.0 + by;
         run.plan.point.w_u *= 1.0 + by;
@@ -201,7 +211,7 @@ impl Parts<'_> {
         let Ok((conditions, run)) = self.at_rate(&own.runs[r], reading, -found.fast) else { return true };
         let mut runs = own.runs.to_vec();
         runs[r] = run;
-        let other = Problem {
+        let other = PlatformProblem {
             conditions: &conditions,
             runs: &runs,
             unknowns: own.unknowns,

@@ -14,9 +14,9 @@ use obsdeg_evidence::prediction::Combination;
 use obsdeg_evidence::simulation::{Conditions, PlatformState};
 
 use super::CalibrationError;
-use super::run::{Key, Run};
+use super::run::{MeasurementKey, RecordedRun};
 use crate::Going;
-use crate::least_squares::{Information, Linearised, Rows, Solution};
+use crate::least_squares::{LeastSquaresSolution, Linearised, StackedRows, StartInformation};
 
 /// Most linearisations.
 const PASSES: usize = 40;
@@ -47,7 +47,7 @@ pub(super) fn largest_turn(correction: &[f64], attitudes: usize) -> f64 {
 
 /// Unknowns of all runs: each run's own (psi, biases), and the common coefficients.
 #[derive(Debug, Clone)]
-pub(crate) struct Unknowns {
+pub(crate) struct RunUnknowns {
     /// Index of the unknown for every state, by run.
     pub index: Vec<Vec<usize>>,
     /// Number of unknowns.
@@ -68,7 +68,7 @@ pub(crate) struct Unknowns {
     pub biases: Vec<usize>,
 }
 
-impl Unknowns {
+impl RunUnknowns {
     /// Unknowns of runs of one platform. Each run has its own `psi` states, then come the `coefficients`
     /// common to all, then the run's own `biases`. `prior` and `first` are those of one run, `null` its
     /// undetermined directions, and `stated` is true for states with a stated prior.
@@ -198,10 +198,10 @@ impl Unknowns {
 }
 
 /// Runs with the assumptions of the fit.
-pub(crate) struct Problem<'a> {
+pub(crate) struct PlatformProblem<'a> {
     pub conditions: &'a Conditions,
-    pub runs: &'a [Run],
-    pub unknowns: &'a Unknowns,
+    pub runs: &'a [RecordedRun],
+    pub unknowns: &'a RunUnknowns,
     /// Standard deviations of a sample, by channel.
     pub sigmas: Vec<f64>,
     /// Prior information on some combinations: rows and values in SI units, with unit errors.
@@ -215,37 +215,37 @@ pub(crate) struct Problem<'a> {
 }
 
 /// All runs, linearised at the estimate.
-pub(crate) struct At {
+pub(crate) struct LinearisedRuns {
     pub x: Vec<PlatformState>,
-    pub runs: Vec<(Linearised, Vec<Key>)>,
-    pub information: Vec<Information>,
+    pub runs: Vec<(Linearised, Vec<MeasurementKey>)>,
+    pub information: Vec<StartInformation>,
     /// Sum of squares of all residuals, with those of constraining rows and prior information.
     pub cost: f64,
 }
 
 /// End of the iteration.
-pub(crate) struct Estimate {
-    pub at: At,
+pub(crate) struct PlatformEstimate {
+    pub at: LinearisedRuns,
     /// Last step (nearly zero) with its covariance.
-    pub solution: Solution,
+    pub solution: LeastSquaresSolution,
     pub passes: usize,
     pub converged: bool,
     /// Number of other minima that are nearly as low.
     pub rivals: usize,
 }
 
-impl Problem<'_> {
+impl PlatformProblem<'_> {
     /// Linearises all runs at `x`.
-    pub(crate) fn at(&self, x: Vec<PlatformState>) -> Result<At, CalibrationError> {
+    pub(crate) fn at(&self, x: Vec<PlatformState>) -> Result<LinearisedRuns, CalibrationError> {
         self.at_parts(x, |_| &[])
     }
 
-    /// Linearises all runs along trajectories in parts, by run (see [`Run::along_parts`]).
+    /// Linearises all runs along trajectories in parts, by run (see [`RecordedRun::along_parts`]).
     pub(super) fn at_parts<'n>(
         &self,
         x: Vec<PlatformState>,
         nodes: impl Fn(usize) -> &'n [(usize, PlatformState)],
-    ) -> Result<At, CalibrationError> {
+    ) -> Result<LinearisedRuns, CalibrationError> {
         self.passes.set(self.passes.get() + 1);
         if !(self.going)(Going::Passes(self.passes.get())) {
             self.stopped.set(true);
@@ -254,18 +254,18 @@ impl Problem<'_> {
         let runs = each.map(|(r, (run, x))| run.along_parts(self.conditions, &self.sigmas, x, nodes(r)));
         let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let information =
-            runs.iter().map(|(run, _)| Information::of(run)).collect::<Result<Vec<_>, EkfError>>()?;
-        let mut cost: f64 = information.iter().map(Information::at_zero).sum();
+            runs.iter().map(|(run, _)| StartInformation::of(run)).collect::<Result<Vec<_>, EkfError>>()?;
+        let mut cost: f64 = information.iter().map(StartInformation::at_zero).sum();
         cost += self.held(&self.unknowns.holding(BOX), &x).norm_squared();
         if let Some((rows, _)) = &self.known {
             cost += self.known_left(rows, &x).norm_squared();
         }
-        Ok(At { x, runs, information, cost })
+        Ok(LinearisedRuns { x, runs, information, cost })
     }
 
     /// States of all runs with all unknowns zero: the platform at the attitudes of the scheme.
     pub(crate) fn at_rest(&self) -> Vec<PlatformState> {
-        let of = |(run, index): (&Run, &Vec<usize>)| {
+        let of = |(run, index): (&RecordedRun, &Vec<usize>)| {
             PlatformState::of_unknowns(&vec![0.0; index.len()], run.plan.constants())
         };
         self.runs.iter().zip(&self.unknowns.index).map(of).collect()
@@ -291,26 +291,30 @@ impl Problem<'_> {
     }
 
     /// Next step from `at`, with a pull to it `weak` times as weak as the prior.
-    pub(crate) fn step(&self, at: &At, weak: f64) -> Result<Solution, EkfError> {
+    pub(crate) fn step(&self, at: &LinearisedRuns, weak: f64) -> Result<LeastSquaresSolution, EkfError> {
         self.step_with(at, weak, None)
     }
 
     /// Next step from `at`, with the undetermined directions constrained within `width` times their prior.
-    pub(crate) fn step_held(&self, at: &At, width: f64) -> Result<Solution, EkfError> {
+    pub(crate) fn step_held(
+        &self,
+        at: &LinearisedRuns,
+        width: f64,
+    ) -> Result<LeastSquaresSolution, EkfError> {
         self.pulled(self.said(at, None, width), WEAK)
     }
 
     /// Next step from `at`, with another information of one run.
     pub(crate) fn step_with(
         &self,
-        at: &At,
+        at: &LinearisedRuns,
         weak: f64,
-        instead: Option<(usize, &Information)>,
-    ) -> Result<Solution, EkfError> {
+        instead: Option<(usize, &StartInformation)>,
+    ) -> Result<LeastSquaresSolution, EkfError> {
         self.pulled(self.said(at, instead, BOX), weak)
     }
 
-    fn pulled(&self, mut rows: Rows, weak: f64) -> Result<Solution, EkfError> {
+    fn pulled(&self, mut rows: StackedRows, weak: f64) -> Result<LeastSquaresSolution, EkfError> {
         let pull = self.unknowns.prior.iter().map(|s| 1.0 / (weak * s));
         let n = self.unknowns.n;
         rows.add(&DMatrix::from_diagonal(&DVector::from_iterator(n, pull)), &DVector::zeros(n));
@@ -318,7 +322,7 @@ impl Problem<'_> {
     }
 
     /// Step from `at` with the prior on everything about the first estimates.
-    pub(crate) fn step_with_prior(&self, at: &At) -> Result<Solution, EkfError> {
+    pub(crate) fn step_with_prior(&self, at: &LinearisedRuns) -> Result<LeastSquaresSolution, EkfError> {
         let mut rows = self.said(at, None, BOX);
         let weights = DVector::from_iterator(self.unknowns.n, self.unknowns.prior.iter().map(|s| 1.0 / s));
         let to = self.unknowns.to_first(&at.x).component_mul(&weights);
@@ -327,9 +331,14 @@ impl Problem<'_> {
     }
 
     /// Rows of the records, of the constrained directions and of the prior information.
-    fn said(&self, at: &At, instead: Option<(usize, &Information)>, width: f64) -> Rows {
+    fn said(
+        &self,
+        at: &LinearisedRuns,
+        instead: Option<(usize, &StartInformation)>,
+        width: f64,
+    ) -> StackedRows {
         let n = self.unknowns.n;
-        let mut rows = Rows::new(n);
+        let mut rows = StackedRows::new(n);
         for (r, (information, index)) in at.information.iter().zip(&self.unknowns.index).enumerate() {
             let information = instead.filter(|(of, _)| *of == r).map_or(information, |(_, other)| other);
             let mut wide = DMatrix::zeros(information.root.nrows(), n);
@@ -347,7 +356,7 @@ impl Problem<'_> {
     }
 
     /// Factor on standard deviations by the fit: root of chi-square per measurement, at least one.
-    fn scale(&self, at: &At) -> f64 {
+    fn scale(&self, at: &LinearisedRuns) -> f64 {
         let rows: usize = at.runs.iter().map(|(run, _)| run.residuals.len()).sum();
         (at.cost / rows.max(1) as f64).max(1.0).sqrt()
     }
@@ -363,7 +372,7 @@ impl Problem<'_> {
     }
 
     /// Largest angle (rad) by which a step turns a platform anywhere in its run.
-    pub(super) fn turn(&self, at: &At, step: &DVector<f64>) -> f64 {
+    pub(super) fn turn(&self, at: &LinearisedRuns, step: &DVector<f64>) -> f64 {
         let mut largest: f64 = 0.0;
         for (((run, _), index), x) in at.runs.iter().zip(&self.unknowns.index).zip(&at.x) {
             let own: Vec<f64> = index.iter().map(|&i| step[i]).collect();
@@ -374,7 +383,7 @@ impl Problem<'_> {
     }
 
     /// Iterates from `x`.
-    pub(super) fn settle(&self, x: Vec<PlatformState>) -> Result<Estimate, CalibrationError> {
+    pub(super) fn settle(&self, x: Vec<PlatformState>) -> Result<PlatformEstimate, CalibrationError> {
         let mut at = self.at(x)?;
         let mut solution = self.step(&at, WEAK)?;
         let (mut passes, mut converged) = (1, false);
@@ -403,11 +412,11 @@ impl Problem<'_> {
         // where no step lowers the sum of squares, the rest of the step is curvature within it
         let size = (&solution.root * &solution.x).norm();
         converged |= size <= NEARLY * self.scale(&at);
-        Ok(Estimate { at, solution, passes, converged, rivals: 0 })
+        Ok(PlatformEstimate { at, solution, passes, converged, rivals: 0 })
     }
 
     /// Number of measurements.
-    pub(crate) fn rows(&self, e: &Estimate) -> f64 {
+    pub(crate) fn rows(&self, e: &PlatformEstimate) -> f64 {
         e.at.runs.iter().map(|(run, _)| run.residuals.len()).sum::<usize>() as f64
     }
 }

@@ -5,11 +5,11 @@
 
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
-use super::diagnose::{MapBoth, Parts};
+use super::diagnose::{AnswerData, MapBoth};
 use super::gross::GrossReason;
 use super::length::wrong;
-use super::run::Run;
-use super::successions::LeftOut;
+use super::run::RecordedRun;
+use super::successions::LeftOutMeasurement;
 use crate::answer::{Calibration, CellKind, ClockRate, Finding, ForceLength, PositionFit, RecordReport};
 use crate::levels;
 
@@ -18,9 +18,9 @@ const AGREE: f64 = 1e-6;
 /// Ratio to the median of the positions from which a position with a worse fit is named.
 const APART: f64 = 2.0;
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Findings against a calibration, with the measurements that it left out.
-    pub(super) fn findings(&self, c: &Calibration, left_out: &[LeftOut]) -> Vec<Finding> {
+    pub(super) fn findings(&self, c: &Calibration, left_out: &[LeftOutMeasurement]) -> Vec<Finding> {
         let jump = self.clock_jump();
         if let Some(jump) = jump.clone().filter(|_| self.jump.is_some_and(|j| j.explains)) {
             // everything else is by times that are wrong
@@ -97,7 +97,7 @@ impl Parts<'_> {
     }
 
     /// Finding on the turns of a run. Where positions last longer by the same factor, the clock is wrong.
-    fn turns(&self, run: &Run) -> Option<Finding> {
+    fn turns(&self, run: &RecordedRun) -> Option<Finding> {
         let factor = run.reading.of_turns(self.planned)?;
         if run.reading.by_durations(self.planned).is_some() {
             return None;
@@ -107,7 +107,7 @@ impl Parts<'_> {
     }
 
     /// Finding on the length of the specific force of a run.
-    fn force(&self, run: &Run) -> Option<Finding> {
+    fn force(&self, run: &RecordedRun) -> Option<Finding> {
         let reading = &run.reading;
         let wrong = wrong(&reading.lengths, levels::FORCE / self.problem.runs.len() as f64)?;
         let end = |p: usize| ForceLength {
@@ -181,7 +181,7 @@ impl Parts<'_> {
 }
 
 /// Findings on repeated values of cells in a column.
-fn cells(run: &Run) -> Vec<Finding> {
+fn cells(run: &RecordedRun) -> Vec<Finding> {
     let mut out: Vec<Finding> = Vec::new();
     for (cell, own) in &run.reading.cells {
         let kind = match cell.why {

@@ -2,11 +2,11 @@
 
 use obsdeg_ekf::consistency::chi_square_band;
 
-use super::diagnose::{Asked, MapBoth, Parts};
+use super::diagnose::{AnswerData, MapBoth, ReportedFunctional};
 use crate::answer::{Fit, Repeatability};
 use crate::levels;
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Degrees of freedom of what is known beside the records: rows of stated priors and of a calibration
     /// before, without those directions that they alone determine.
     fn free_of_priors(&self) -> f64 {
@@ -22,12 +22,13 @@ impl Parts<'_> {
     }
 
     /// Chi-square of everything: degrees of freedom are measurements and priors minus what they determine.
-    pub(super) fn fit(&self, unknowns: &[Asked], combinations: &[Asked]) -> Fit {
+    pub(super) fn fit(&self, unknowns: &[ReportedFunctional], combinations: &[ReportedFunctional]) -> Fit {
         let (_, free) = self.found.sums(|_| true);
         let left: f64 = self.estimate.at.cost - (&self.linear.root * &self.linear.x).norm_squared();
         // what several records share counts once: every run alone leaves more free than all together
         let alone = self.problem.runs.len() - 1;
-        let coefficients = |a: &&Asked| a.determined && a.terms.iter().all(|(i, _)| *i >= self.shared());
+        let coefficients =
+            |a: &&ReportedFunctional| a.determined && a.terms.iter().all(|(i, _)| *i >= self.shared());
         let shared = unknowns.iter().chain(combinations).filter(coefficients).count();
         let degrees_of_freedom =
             free + (alone * shared) as f64 + self.free_of_priors() + self.free_of_biases();

@@ -5,10 +5,10 @@ use std::cell::Cell;
 use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::PlatformState;
 
-use super::estimate::{Estimate, Problem};
+use super::estimate::{PlatformEstimate, PlatformProblem};
 use super::placed::Reading;
-use super::run::Run;
-use super::timeline::Gap;
+use super::run::RecordedRun;
+use super::timeline::RowGap;
 use super::{CalibrationError, STRICT};
 
 /// Most gaps of a record that are examined, the longest first.
@@ -44,7 +44,7 @@ pub(crate) struct Jump {
     pub explains: bool,
 }
 
-impl Problem<'_> {
+impl PlatformProblem<'_> {
     /// Jump of a clock that explains most of an inconsistent fit, by a fit of all measurements without it.
     /// `start` is the first iterate of every run; `lay` places a reading on the timeline.
     ///
@@ -52,9 +52,9 @@ impl Problem<'_> {
     /// [`CalibrationError`] for a number that is not finite in the fit as it is.
     pub(super) fn jump(
         &self,
-        estimate: &Estimate,
+        estimate: &PlatformEstimate,
         start: &[PlatformState],
-        lay: &dyn Fn(Reading) -> Result<Run, CalibrationError>,
+        lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Result<Option<Jump>, CalibrationError> {
         let free = (self.rows(estimate) - self.unknowns.n as f64).max(1.0);
         let most = chi_square_band(free, 1.0, STRICT).1;
@@ -91,7 +91,7 @@ impl Problem<'_> {
         gap: usize,
         most: f64,
         start: &[PlatformState],
-        lay: &dyn Fn(Reading) -> Result<Run, CalibrationError>,
+        lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Option<(f64, Closed)> {
         let reading = &self.runs[r].reading;
         let (gap, interval) = (&reading.gaps[gap], reading.interval);
@@ -99,7 +99,7 @@ impl Problem<'_> {
         runs.iter_mut().flat_map(|run| &mut run.counts).for_each(|bin| bin.fill(true));
         let mut fit = |by: f64, x: &[PlatformState], first: bool| -> Option<Closed> {
             runs[r] = lay(reading.without(gap, by)).ok()?;
-            let problem = Problem {
+            let problem = PlatformProblem {
                 runs: &runs,
                 conditions: self.conditions,
                 unknowns: self.unknowns,
@@ -145,7 +145,7 @@ impl Problem<'_> {
 
 impl Reading {
     /// Reading by a clock that was not set forward by `by` s in a gap.
-    fn without(&self, gap: &Gap, by: f64) -> Self {
+    fn without(&self, gap: &RowGap, by: f64) -> Self {
         let mut out = self.clone();
         let behind = (gap.from + gap.to) / 2.0 - self.origin;
         let set = |t: &mut f64| {

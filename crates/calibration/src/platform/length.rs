@@ -43,7 +43,7 @@ pub(crate) struct Wrong {
 }
 
 /// Straight line through the squares of the lengths.
-struct Line {
+struct LengthLine {
     coefficients: DVector<f64>,
     /// Standard deviation of the last coefficient.
     sigma: f64,
@@ -54,7 +54,7 @@ struct Line {
 }
 
 /// Least-squares fit of `|f|^2 - 1` by `columns`.
-fn line(all: &[Length], columns: &[Vec<f64>]) -> Option<Line> {
+fn line(all: &[Length], columns: &[Vec<f64>]) -> Option<LengthLine> {
     let (m, n) = (all.len(), columns.len());
     let weights: Vec<f64> = all.iter().map(|l| 1.0 / (2.0 * l.length * l.sigma)).collect();
     let y = DVector::from_fn(m, |i, _| all[i].length.powi(2) - 1.0);
@@ -72,10 +72,16 @@ fn line(all: &[Length], columns: &[Vec<f64>]) -> Option<Line> {
     let left = y - a * &coefficients;
     let chi_square = left.iter().zip(&weights).map(|(e, w)| (e * w).powi(2)).sum();
     let sigma = inverse[(n - 1, n - 1)].max(0.0).sqrt();
-    Some(Line { coefficients, sigma, chi_square, left: (left.norm_squared() / m as f64).sqrt(), free: m - n })
+    Some(LengthLine {
+        coefficients,
+        sigma,
+        chi_square,
+        left: (left.norm_squared() / m as f64).sqrt(),
+        free: m - n,
+    })
 }
 
-impl Line {
+impl LengthLine {
     /// True if chance leaves as much with a probability of `level`.
     fn fits(&self, level: f64) -> bool {
         let free = self.free as f64;

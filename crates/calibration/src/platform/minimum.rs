@@ -6,7 +6,7 @@ use obsdeg_evidence::simulation::{Noise, PlatformState};
 
 use super::CalibrationError;
 use super::curvature::BENT;
-use super::estimate::{Estimate, Problem};
+use super::estimate::{PlatformEstimate, PlatformProblem};
 
 /// Sum of squares, as a multiple of the number of measurements, above which a fit is poor.
 const POOR: f64 = 2.0;
@@ -28,31 +28,35 @@ const RIVAL: f64 = 14.0;
 /// Least distance of a rival minimum, in sigma.
 const APART: f64 = 5.0;
 
-impl Problem<'_> {
+impl PlatformProblem<'_> {
     /// Estimate from `x`. If `first`, it starts by multiple shooting (also from `x` itself, if that does not
     /// converge or fits poorly), and is the lowest of the minima about it.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
-    pub(super) fn estimate(&self, x: Vec<PlatformState>, first: bool) -> Result<Estimate, CalibrationError> {
+    pub(super) fn estimate(
+        &self,
+        x: Vec<PlatformState>,
+        first: bool,
+    ) -> Result<PlatformEstimate, CalibrationError> {
         let before = self.passes.get();
         if !first {
             return self.longer(self.settle(x)?);
         }
         let found = self.lowest(self.longer(self.first(x)?)?)?;
         let found = self.longer(found)?;
-        Ok(Estimate { passes: self.passes.get() - before, ..found })
+        Ok(PlatformEstimate { passes: self.passes.get() - before, ..found })
     }
 
     /// The iteration from an estimate on where it has not settled and leads further down.
-    fn longer(&self, mut estimate: Estimate) -> Result<Estimate, CalibrationError> {
+    fn longer(&self, mut estimate: PlatformEstimate) -> Result<PlatformEstimate, CalibrationError> {
         for _ in 0..LONGER {
             if estimate.converged || self.stopped.get() {
                 break;
             }
             let next = self.settle(estimate.at.x.clone())?;
             let stays = !next.converged && next.at.cost >= estimate.at.cost * (1.0 - 1e-9);
-            estimate = Estimate { rivals: estimate.rivals, ..next };
+            estimate = PlatformEstimate { rivals: estimate.rivals, ..next };
             if stays {
                 break;
             }
@@ -61,11 +65,11 @@ impl Problem<'_> {
     }
 
     /// Estimate without a search for a lower minimum.
-    fn first(&self, x: Vec<PlatformState>) -> Result<Estimate, CalibrationError> {
+    fn first(&self, x: Vec<PlatformState>) -> Result<PlatformEstimate, CalibrationError> {
         let shot = self.shoot(&x).ok().flatten();
         let Some(start) = shot else { return self.settle(x) };
         let found = self.settle(start);
-        let poor = |e: &Estimate| !e.converged || e.at.cost > POOR * self.rows(e);
+        let poor = |e: &PlatformEstimate| !e.converged || e.at.cost > POOR * self.rows(e);
         if found.as_ref().is_ok_and(|e| !poor(e)) || self.stopped.get() {
             return found;
         }
@@ -86,7 +90,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
-    fn lowest(&self, estimate: Estimate) -> Result<Estimate, CalibrationError> {
+    fn lowest(&self, estimate: PlatformEstimate) -> Result<PlatformEstimate, CalibrationError> {
         if self.stopped.get() {
             return Ok(estimate);
         }
@@ -99,7 +103,7 @@ impl Problem<'_> {
             return Ok(estimate);
         };
         let mut best = estimate;
-        let mut others: Vec<Estimate> = Vec::new();
+        let mut others: Vec<PlatformEstimate> = Vec::new();
         for start in starts {
             if self.stopped.get() {
                 break;
@@ -114,7 +118,7 @@ impl Problem<'_> {
                 others.push(e);
             }
         }
-        let rival = |e: &&Estimate| {
+        let rival = |e: &&PlatformEstimate| {
             let far = (&best.solution.root * self.between(&best.at.x, &e.at.x)).norm();
             e.converged && e.at.cost < best.at.cost + RIVAL && far > APART
         };
@@ -124,7 +128,7 @@ impl Problem<'_> {
 
     /// Starts along the axes of the posterior of an estimate, in both directions, and starts drawn from the
     /// priors.
-    fn starts_about(&self, estimate: &Estimate) -> Vec<Vec<PlatformState>> {
+    fn starts_about(&self, estimate: &PlatformEstimate) -> Vec<Vec<PlatformState>> {
         let from = &estimate.at.x;
         let axes = self.axes(estimate);
         let mut out: Vec<Vec<PlatformState>> =

@@ -40,7 +40,7 @@ use crate::answer::{Before, Calibration, CovarianceTable};
 pub use crate::record::STANDARD_GRAVITY;
 use crate::record::{Record, RecordError};
 use crate::setup::Setup;
-use estimate::Unknowns;
+use estimate::RunUnknowns;
 use rounds::{CalibrationInputs, RoundEnd, Rounds};
 
 pub use mistaken::Mistaken;
@@ -318,7 +318,7 @@ fn known(
     table: &CovarianceTable,
     plan: &Plan,
     prediction: &obsdeg_evidence::prediction::Prediction,
-    unknowns: &Unknowns,
+    unknowns: &RunUnknowns,
 ) -> Result<Known, CalibrationError> {
     let (names, units) = (plan.platform.names(), plan.platform.units());
     let psi = plan.unknowns() - plan.platform.coefficients();

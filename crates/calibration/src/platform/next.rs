@@ -7,14 +7,14 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Dwell, Euler, Position, Scheme, cardinal, cardinal_name, cardinal_names};
-use obsdeg_evidence::simulation::{Plan, RunStart, Segment, predict, si_per_shown};
+use obsdeg_evidence::simulation::{Plan, PlanSegment, RunStart, predict, si_per_shown};
 
-use super::diagnose::Parts;
-use super::estimate::{Unknowns, WEAK};
+use super::diagnose::AnswerData;
+use super::estimate::{RunUnknowns, WEAK};
 use super::run::noise_root;
 use super::{CalibrationError, known};
 use crate::answer::{Calibration, CovarianceTable, Estimated, NextRun};
-use crate::least_squares::{Information, Linearised, Rows, Solution};
+use crate::least_squares::{LeastSquaresSolution, Linearised, StackedRows, StartInformation};
 
 /// Longest dwell, in longest dwells of the scheme.
 const LONGEST: f64 = 16.0;
@@ -38,13 +38,13 @@ fn candidates(scheme: &Scheme) -> Vec<(String, Euler)> {
 
 /// Covariance of the coefficients, and the conditions of a further run.
 struct Further<'p, 'a> {
-    parts: &'p Parts<'a>,
+    parts: &'p AnswerData<'a>,
     table: CovarianceTable,
     /// Variance of a mean over one second, by channel, as the fit has it.
     variances: Vec<f64>,
 }
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Further runs, one per missed requirement: the attitude that brings the coefficient closest to it, and
     /// the dwell that meets it. `bench` has the contributions of a bench by name, which no run reduces.
     ///
@@ -130,7 +130,7 @@ fn no_run(e: &Estimated) -> NextRun {
 
 impl Further<'_, '_> {
     /// Coefficients by this answer and a dwell of `dwell_s` at an attitude.
-    fn with(&self, angles: &Euler, dwell_s: f64) -> Result<Solution, CalibrationError> {
+    fn with(&self, angles: &Euler, dwell_s: f64) -> Result<LeastSquaresSolution, CalibrationError> {
         let (scheme, conditions) = (self.parts.scheme, self.parts.conditions);
         let own = Position {
             name: "p1".into(),
@@ -142,12 +142,12 @@ impl Further<'_, '_> {
         let scheme = Scheme { positions: vec![own], ..scheme.clone() };
         let conditions = super::run::conditions(conditions);
         let step = dwell_s / STEPS as f64;
-        let plan =
-            Plan::derived(&scheme, &conditions)?.in_steps(&conditions, |_: &Segment| vec![(STEPS, step)])?;
+        let plan = Plan::derived(&scheme, &conditions)?
+            .in_steps(&conditions, |_: &PlanSegment| vec![(STEPS, step)])?;
         let prediction = predict(&plan, self.parts.options.seed)?;
         let start = RunStart::new(&plan, &conditions)?;
         let (n, coefficients, biases) = (plan.unknowns(), plan.platform.coefficients(), plan.biases.len());
-        let unknowns = Unknowns::new(
+        let unknowns = RunUnknowns::new(
             1,
             [n - coefficients, coefficients, biases],
             &start.sigma,
@@ -155,8 +155,8 @@ impl Further<'_, '_> {
             &[],
             &vec![false; n + biases],
         );
-        let information = Information::of(&self.run(&plan, step))?;
-        let mut rows = Rows::new(unknowns.n);
+        let information = StartInformation::of(&self.run(&plan, step))?;
+        let mut rows = StackedRows::new(unknowns.n);
         let mut wide = DMatrix::zeros(information.root.nrows(), unknowns.n);
         for (s, &i) in unknowns.index[0].iter().enumerate() {
             wide.set_column(i, &information.root.column(s));
@@ -189,7 +189,7 @@ impl Further<'_, '_> {
     }
 
     /// Sigma of a coefficient, in its shown unit.
-    fn sigma(&self, of: &Solution, name: &str) -> f64 {
+    fn sigma(&self, of: &LeastSquaresSolution, name: &str) -> f64 {
         let platform = &self.parts.planned.platform;
         // a run of one position has the psi of the scheme: the coefficients follow it
         let coefficients = platform.coefficients();

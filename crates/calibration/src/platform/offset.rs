@@ -7,11 +7,11 @@
 use nalgebra::DVector;
 use obsdeg_ekf::consistency::chi_square_band;
 
-use super::estimate::{Estimate, Problem, WEAK};
+use super::estimate::{PlatformEstimate, PlatformProblem, WEAK};
 use super::placed::{By, Reading};
-use super::run::Run;
+use super::run::RecordedRun;
 use super::{CalibrationError, STRICT};
-use crate::least_squares::Information;
+use crate::least_squares::StartInformation;
 
 /// Step for finite differences of the beginning, as a fraction of the open interval.
 const MOVED: f64 = 0.02;
@@ -47,7 +47,7 @@ pub(super) struct Later {
     pub weight: f64,
 }
 
-impl Problem<'_> {
+impl PlatformProblem<'_> {
     /// Best beginning of run `r` between `from` and `to` (s of its clock) with all unknowns free; `lay`
     /// places a reading on the timeline.
     ///
@@ -55,10 +55,10 @@ impl Problem<'_> {
     /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn offset(
         &self,
-        estimate: &Estimate,
+        estimate: &PlatformEstimate,
         r: usize,
         (from, to): (f64, f64),
-        lay: &dyn Fn(Reading) -> Result<Run, CalibrationError>,
+        lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Result<Offset, CalibrationError> {
         let (own, at) = (&self.runs[r], &estimate.at);
         let (middle, width) = ((from + to) / 2.0, (to - from) / 12f64.sqrt());
@@ -67,7 +67,7 @@ impl Problem<'_> {
             let mut run = lay(own.reading.later(by))?;
             run.counts.clone_from(&own.counts);
             let (along, _) = run.along(self.conditions, &self.sigmas, &at.x[r])?;
-            let information = Information::of(&along)?;
+            let information = StartInformation::of(&along)?;
             let solution = self.step_with(at, WEAK, Some((r, &information)))?;
             let before = ((own.reading.origin + by - middle) / width).powi(2);
             Ok((information.left + solution.left + before, solution.x))
@@ -92,10 +92,10 @@ impl Problem<'_> {
     /// See [`Self::offset`].
     pub(super) fn open(
         &self,
-        estimate: &Estimate,
-        lay: &dyn Fn(Reading) -> Result<Run, CalibrationError>,
+        estimate: &PlatformEstimate,
+        lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Result<Vec<Option<Offset>>, CalibrationError> {
-        let of = |(r, run): (usize, &Run)| {
+        let of = |(r, run): (usize, &RecordedRun)| {
             run.reading.open.map(|window| self.offset(estimate, r, window, lay)).transpose()
         };
         self.runs.iter().enumerate().map(of).collect()
@@ -108,10 +108,10 @@ impl Problem<'_> {
     /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn later(
         &self,
-        estimate: &Estimate,
-        lay: &dyn Fn(Reading) -> Result<Run, CalibrationError>,
+        estimate: &PlatformEstimate,
+        lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Result<Vec<Option<Later>>, CalibrationError> {
-        let of = |(r, own): (usize, &Run)| -> Result<Option<Later>, CalibrationError> {
+        let of = |(r, own): (usize, &RecordedRun)| -> Result<Option<Later>, CalibrationError> {
             let Some((from, to)) = own.reading.open else { return Ok(None) };
             let step = MOVED * (to - from);
             let residuals = |by: f64| {
@@ -135,9 +135,9 @@ impl Problem<'_> {
     /// See [`Self::offset`].
     pub(super) fn begins_elsewhere(
         &self,
-        estimate: &Estimate,
+        estimate: &PlatformEstimate,
         r: usize,
-        lay: &dyn Fn(Reading) -> Result<Run, CalibrationError>,
+        lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Result<bool, CalibrationError> {
         let reading = &self.runs[r].reading;
         if reading.open.is_some() || !matches!(reading.by, By::Timeline | By::Both) {

@@ -7,7 +7,7 @@ use super::clock::{by_durations, of_turns};
 use super::gross;
 use super::length::Length;
 use super::record_columns::RecordColumns;
-use super::timeline::{self, Gap, by_rows};
+use super::timeline::{self, RowGap, by_rows};
 use crate::answer::{self, EmptyCells, PositionsBy};
 use crate::bins::{Bin, Spike};
 use crate::record::Record;
@@ -48,7 +48,7 @@ pub(crate) struct Reading {
     /// Usual interval between rows, in s.
     pub interval: f64,
     /// Intervals with missing rows.
-    pub gaps: Vec<Gap>,
+    pub gaps: Vec<RowGap>,
     /// Times of the first and the last sample, by position, in s.
     pub stays: Vec<(f64, f64)>,
     /// Times of the first row behind each position, in s; infinite at the end of the record.
@@ -160,7 +160,8 @@ impl Reading {
             [None, Some(q)] => format!("before {}", name(q)),
             [None, None] => "between positions".into(),
         };
-        let of = |g: &Gap| answer::Gap { from_s: g.from, to_s: g.to, line: g.line, place: place(g.between) };
+        let of =
+            |g: &RowGap| answer::Gap { from_s: g.from, to_s: g.to, line: g.line, place: place(g.between) };
         self.gaps.iter().map(of).collect()
     }
 

@@ -10,8 +10,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use obsdeg_evidence::simulation::Noise;
 
 use super::CalibrationError;
-use super::estimate::{At, BOX, Estimate, Problem, TURN};
-use crate::least_squares::{Information, Linearised, State};
+use super::estimate::{BOX, LinearisedRuns, PlatformEstimate, PlatformProblem, TURN};
+use crate::least_squares::{Linearised, RunState, StartInformation};
 
 /// Most linearisations of a sample.
 const PASSES: usize = 25;
@@ -21,7 +21,7 @@ const SOLVED: f64 = 1e-2;
 const HALVINGS: usize = 8;
 
 /// Sample of a posterior.
-pub(super) struct Sample {
+pub(super) struct PosteriorSample {
     /// Unknowns, relative to the estimate.
     pub x: DVector<f64>,
     /// Logarithm of its weight, relative to that of the estimate.
@@ -60,8 +60,8 @@ fn derivative(run: &Linearised) -> DMatrix<f64> {
 fn weighted(run: &Linearised, residuals: &[f64]) -> Result<DVector<f64>, CalibrationError> {
     let n = run.states();
     let run = Linearised { residuals: residuals.to_vec(), ..run.clone() };
-    let start = State { correction: DVector::zeros(n), root: DMatrix::zeros(n, 0) };
-    let states = Information::of(&run)?.states(&run, start)?;
+    let start = RunState { correction: DVector::zeros(n), root: DMatrix::zeros(n, 0) };
+    let states = StartInformation::of(&run)?.states(&run, start)?;
     let mut out = Vec::with_capacity(residuals.len());
     for (stage, state) in run.stages.iter().zip(&states[1..]) {
         for output in &stage.outputs {
@@ -80,12 +80,12 @@ pub(super) fn normal_pairs(n: usize, pairs: usize, noise: &mut Noise) -> Option<
     root.l_dirty().solve_lower_triangular(&all)
 }
 
-impl Problem<'_> {
+impl PlatformProblem<'_> {
     /// Equation of the samples about an estimate; `None` if its information is singular.
     ///
     /// # Errors
     /// [`CalibrationError`] when a number is not finite.
-    pub(super) fn equation(&self, estimate: &Estimate) -> Result<Option<Equation>, CalibrationError> {
+    pub(super) fn equation(&self, estimate: &PlatformEstimate) -> Result<Option<Equation>, CalibrationError> {
         let mut all = Vec::with_capacity(self.runs.len());
         for (run, _) in &estimate.at.runs {
             let own = derivative(run);
@@ -102,7 +102,12 @@ impl Problem<'_> {
     }
 
     /// `J^T J(x)`, with J that of the estimate.
-    fn slope(&self, weighted: &[DMatrix<f64>], beside: &[DMatrix<f64>; 2], at: &At) -> DMatrix<f64> {
+    fn slope(
+        &self,
+        weighted: &[DMatrix<f64>],
+        beside: &[DMatrix<f64>; 2],
+        at: &LinearisedRuns,
+    ) -> DMatrix<f64> {
         let mut out: DMatrix<f64> = beside.iter().map(|rows| rows.transpose() * rows).sum();
         for (((run, _), weighted), index) in at.runs.iter().zip(weighted).zip(&self.unknowns.index) {
             let own = weighted.transpose() * derivative(run);
@@ -114,7 +119,7 @@ impl Problem<'_> {
     }
 
     /// `J^T r(x)`, with J that of the estimate.
-    fn pull(&self, of: &Equation, at: &At) -> DVector<f64> {
+    fn pull(&self, of: &Equation, at: &LinearisedRuns) -> DVector<f64> {
         let [held, known] = &of.beside;
         let mut out =
             held.transpose() * self.held(held, &at.x) + known.transpose() * self.known_left(known, &at.x);
@@ -126,10 +131,16 @@ impl Problem<'_> {
     }
 
     /// Sample for `eps`; `None` if its equation is not solved.
-    pub(super) fn sample(&self, of: &Equation, estimate: &Estimate, eps: &DVector<f64>) -> Option<Sample> {
+    pub(super) fn sample(
+        &self,
+        of: &Equation,
+        estimate: &PlatformEstimate,
+        eps: &DVector<f64>,
+    ) -> Option<PosteriorSample> {
         let towards = of.root.l_dirty().lower_triangle() * eps;
         // what is left of the equation, in sigma
-        let left = |at: &At| of.root.l_dirty().solve_lower_triangular(&(self.pull(of, at) + &towards));
+        let left =
+            |at: &LinearisedRuns| of.root.l_dirty().solve_lower_triangular(&(self.pull(of, at) + &towards));
         let mut at = self.at(estimate.at.x.clone()).ok()?;
         let mut length = left(&at)?.norm();
         for _ in 0..PASSES {
@@ -140,7 +151,8 @@ impl Problem<'_> {
                 let volume: f64 = lu.u().diagonal().iter().map(|u| u.abs().ln()).sum();
                 let there: f64 = of.root.l_dirty().diagonal().iter().map(|l| 2.0 * l.ln()).sum();
                 let fit = (eps.norm_squared() - (at.cost - estimate.at.cost)) / 2.0;
-                return Some(Sample { x, weight: fit - volume + there }).filter(|s| s.weight.is_finite());
+                return Some(PosteriorSample { x, weight: fit - volume + there })
+                    .filter(|s| s.weight.is_finite());
             }
             let step = lu.solve(&(self.pull(of, &at) + &towards))?;
             let mut step = &step * (TURN / self.turn(&at, &step)).min(1.0);

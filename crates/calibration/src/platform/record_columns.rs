@@ -6,7 +6,7 @@ use obsdeg_evidence::simulation::Plan;
 
 use super::CalibrationError;
 use super::force::ForceColumn;
-use crate::record::{Column, Record, RecordError, Wanted};
+use crate::record::{Record, RecordColumn, RecordError, Wanted};
 
 /// Units of forces, with their values in g (`None`: a metre per second squared, which depends on gravity).
 const FORCES: [(&str, Option<f64>); 4] =
@@ -165,7 +165,7 @@ impl RecordColumns {
         let label = record.find("position");
         let used = |i: usize| label == Some(i) || wanted.iter().any(|w| w.column == i);
         let ignored = record.columns().iter().enumerate().filter(|(i, _)| !used(*i));
-        let ignored = ignored.map(|(_, c): (usize, &Column)| c.text.clone()).collect();
+        let ignored = ignored.map(|(_, c): (usize, &RecordColumn)| c.text.clone()).collect();
         Ok(Self {
             observed,
             forces,

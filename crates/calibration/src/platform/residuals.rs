@@ -4,7 +4,7 @@ use obsdeg_core::model::AZIMUTH;
 use obsdeg_ekf::allan::overlapping_deviation;
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail};
 
-use super::diagnose::{MeasurementResidual, Parts};
+use super::diagnose::{AnswerData, MeasurementResidual};
 use super::placed::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 
@@ -15,7 +15,7 @@ const POINTS: usize = 1000;
 /// Largest lag of the correlation, in residuals.
 const LAGS: usize = 20;
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Probability that independent residuals are correlated as these are, by those of the filter: between
     /// those of a smoother an estimate leaves correlations of about minus its unknowns over their number.
     pub(super) fn whiteness(&self, run: usize, channel: usize) -> Option<f64> {

@@ -10,12 +10,12 @@ use obsdeg_ekf::consistency::chi_square_quantile;
 use obsdeg_evidence::prediction::Prediction;
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, RunStart};
 
-use super::diagnose::{Diagnosed, Parts};
-use super::estimate::{Estimate, Problem, Unknowns};
+use super::diagnose::{AnswerData, Diagnosed};
+use super::estimate::{PlatformEstimate, PlatformProblem, RunUnknowns};
 use super::observe::observe;
 use super::offset::{Offset, SETTLED};
 use super::placed::Reading;
-use super::run::{Key, Run};
+use super::run::{MeasurementKey, RecordedRun};
 use super::{CalibrationError, Options, known};
 use crate::Going;
 use crate::answer::Calibration;
@@ -43,7 +43,7 @@ pub(super) struct CalibrationInputs<'a> {
 
 /// Unknowns of all runs with the prior information on them.
 pub(super) struct UnknownsWithPrior {
-    pub unknowns: Unknowns,
+    pub unknowns: RunUnknowns,
     /// Rows and values of a prior calibration, with unit errors.
     pub known: Option<(DMatrix<f64>, DVector<f64>)>,
     /// Names in the prior calibration of what these rows determine.
@@ -55,8 +55,8 @@ impl CalibrationInputs<'_> {
     ///
     /// # Errors
     /// [`CalibrationError`].
-    fn lay(&self, reading: Reading) -> Result<Run, CalibrationError> {
-        Run::new(reading, self.scheme, self.planned, self.own)
+    fn lay(&self, reading: Reading) -> Result<RecordedRun, CalibrationError> {
+        RecordedRun::new(reading, self.scheme, self.planned, self.own)
     }
 
     /// Runs of the records, and the records that the estimates rest on. `sigmas` are those of a sample, by
@@ -68,7 +68,7 @@ impl CalibrationInputs<'_> {
         &self,
         records: Vec<Record>,
         sigmas: &[f64],
-    ) -> Result<(Vec<Run>, Vec<Basis>), CalibrationError> {
+    ) -> Result<(Vec<RecordedRun>, Vec<Basis>), CalibrationError> {
         let mut runs = Vec::with_capacity(records.len());
         let before = self.options.prior.as_ref();
         let mut rests_on: Vec<Basis> = Vec::new();
@@ -111,7 +111,7 @@ impl CalibrationInputs<'_> {
             |name: &String| self.own.stated_priors().iter().any(|a| concerns(&a.name, name)) && !held(name);
         let stated: Vec<bool> =
             planned.platform.names().iter().map(counts).chain(std::iter::repeat_n(false, biases)).collect();
-        let mut unknowns = Unknowns::new(
+        let mut unknowns = RunUnknowns::new(
             runs,
             [n - coefficients, coefficients, biases],
             &start.sigma,
@@ -163,14 +163,14 @@ pub(super) enum RoundEnd {
     /// Runs whose beginnings the records leave open.
     Open(Vec<bool>),
     /// Measurements that are left out.
-    LeftOut(Vec<(usize, Key)>),
+    LeftOut(Vec<(usize, MeasurementKey)>),
     /// No change.
     Last(Box<LastRound>),
 }
 
 /// Estimate of the last round.
 pub(super) struct LastRound {
-    estimate: Estimate,
+    estimate: PlatformEstimate,
     found: Diagnosed,
     /// Number of outliers where they are too many to be left out.
     too_many: Option<usize>,
@@ -207,11 +207,11 @@ impl<'a> Rounds<'a> {
     }
 
     /// Problem of the next round.
-    pub(super) fn problem<'p>(&self, runs: &'p [Run]) -> Problem<'p>
+    pub(super) fn problem<'p>(&self, runs: &'p [RecordedRun]) -> PlatformProblem<'p>
     where
         'a: 'p,
     {
-        Problem {
+        PlatformProblem {
             conditions: self.inputs.own,
             runs,
             unknowns: &self.known.unknowns,
@@ -227,7 +227,7 @@ impl<'a> Rounds<'a> {
     ///
     /// # Errors
     /// [`CalibrationError`].
-    pub(super) fn round(&mut self, problem: &Problem<'_>) -> Result<RoundEnd, CalibrationError> {
+    pub(super) fn round(&mut self, problem: &PlatformProblem<'_>) -> Result<RoundEnd, CalibrationError> {
         self.round += 1;
         let mut estimate = problem.estimate(std::mem::take(&mut self.x), self.round == 1)?;
         if self.round == 1 {
@@ -271,7 +271,11 @@ impl<'a> Rounds<'a> {
     }
 
     /// Seeks the beginnings that labels leave open; true if one of them has not settled.
-    fn begin_later(&mut self, problem: &Problem<'_>, estimate: &Estimate) -> Result<bool, CalibrationError> {
+    fn begin_later(
+        &mut self,
+        problem: &PlatformProblem<'_>,
+        estimate: &PlatformEstimate,
+    ) -> Result<bool, CalibrationError> {
         self.beginnings += 1;
         let inputs = self.inputs;
         self.offsets = problem.open(estimate, &|reading| inputs.lay(reading))?;
@@ -283,7 +287,7 @@ impl<'a> Rounds<'a> {
     ///
     /// # Errors
     /// [`CalibrationError`].
-    pub(super) fn shift(&self, runs: &mut [Run]) -> Result<(), CalibrationError> {
+    pub(super) fn shift(&self, runs: &mut [RecordedRun]) -> Result<(), CalibrationError> {
         for (run, o) in runs.iter_mut().zip(&self.offsets) {
             if let Some(o) = o {
                 let counts = std::mem::take(&mut run.counts);
@@ -300,7 +304,7 @@ impl<'a> Rounds<'a> {
     /// [`CalibrationError`].
     pub(super) fn answer(
         &self,
-        problem: &Problem<'_>,
+        problem: &PlatformProblem<'_>,
         last: LastRound,
         rests_on: Vec<Basis>,
     ) -> Result<Calibration, CalibrationError> {
@@ -320,7 +324,7 @@ impl<'a> Rounds<'a> {
         }
         let later = problem.later(&estimate, &lay)?;
         let jump = problem.jump(&estimate, &self.first, &lay)?;
-        let parts = Parts {
+        let parts = AnswerData {
             scheme: inputs.scheme,
             conditions: inputs.conditions,
             options: inputs.options,

@@ -10,7 +10,7 @@ use obsdeg_ekf::{
     EkfError, Manifold, Measurement, Motion, ProcessNoise, ScalarOutput, Stage, Transition, Update,
 };
 use obsdeg_evidence::simulation::{
-    Conditions, Extended, Plan, PlatformMotion, PlatformState, Segment, SegmentKind, Tilt,
+    Conditions, ExtendedFilter, Plan, PlanSegment, PlatformMotion, PlatformState, SegmentKind, Tilt,
 };
 
 use super::CalibrationError;
@@ -25,7 +25,7 @@ const CLOSEST: f64 = 1e-6;
 
 /// Run with its bins on its timeline.
 #[derive(Debug, Clone)]
-pub(crate) struct Run {
+pub(crate) struct RecordedRun {
     pub reading: Reading,
     pub plan: Plan,
     /// Bin at the end of each segment of the plan, as (position, index).
@@ -33,12 +33,12 @@ pub(crate) struct Run {
     /// Flags by bin (in order) and channel: true if the measurement counts.
     pub counts: Vec<Vec<bool>>,
     /// Changes of position whose time the rows leave open, in order.
-    pub changes: Vec<Change>,
+    pub changes: Vec<PositionChange>,
 }
 
 /// Change of position at a time that is known to within an interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Change {
+pub(crate) struct PositionChange {
     /// Index of the position that begins.
     pub to: usize,
     /// Its first segment.
@@ -113,7 +113,7 @@ fn with_change(root: DMatrix<f64>, drift: &[f64], open: f64) -> DMatrix<f64> {
 
 /// Measurement of a row of a linearised run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Key {
+pub(crate) struct MeasurementKey {
     pub position: usize,
     /// Index of the bin in the run.
     pub bin: usize,
@@ -201,10 +201,10 @@ fn bins_of_segments(
     plan: &Plan,
     reading: &Reading,
     open: &[f64],
-) -> (Vec<Option<(usize, usize)>>, Vec<Change>) {
+) -> (Vec<Option<(usize, usize)>>, Vec<PositionChange>) {
     let mut seen = vec![0; open.len()];
     let mut bins = Vec::with_capacity(plan.segments.len());
-    let mut changes: Vec<Change> = Vec::new();
+    let mut changes: Vec<PositionChange> = Vec::new();
     for (k, s) in plan.segments.iter().enumerate() {
         let next = seen[s.position];
         let at_rest = !matches!(s.kind, SegmentKind::Slew(_));
@@ -214,7 +214,7 @@ fn bins_of_segments(
             // an attitude of its own begins where the position does
             let carried = plan.psi_columns(from) == plan.psi_columns(k);
             let open = if carried { open[s.position] } else { 0.0 };
-            changes.push(Change { to: s.position, begin: k, open });
+            changes.push(PositionChange { to: s.position, begin: k, open });
         }
         bins.push(there.then_some((s.position, next)));
         seen[s.position] += usize::from(there);
@@ -223,7 +223,7 @@ fn bins_of_segments(
     (bins, changes)
 }
 
-impl Run {
+impl RecordedRun {
     /// Places a reading on the timeline of `scheme`, whose own plan is `planned`: positions begin and end as
     /// in the record.
     ///
@@ -249,7 +249,8 @@ impl Run {
                 begins[s.position] = s.start_s;
             }
         }
-        let of = |s: &Segment| parts(&reading.bins[s.position], begins[s.position], s.steps as f64 * s.dt);
+        let of =
+            |s: &PlanSegment| parts(&reading.bins[s.position], begins[s.position], s.steps as f64 * s.dt);
         let plan = plan.in_steps(conditions, of)?;
         let (bins, changes) = bins_of_segments(&plan, &reading, &open);
         let all = bins.iter().flatten().count();
@@ -263,12 +264,12 @@ impl Run {
     }
 
     /// Measurements of the run in order, with their keys and bins.
-    pub(crate) fn measured(&self) -> impl Iterator<Item = (Key, Mean, &Bin)> + '_ {
+    pub(crate) fn measured(&self) -> impl Iterator<Item = (MeasurementKey, Mean, &Bin)> + '_ {
         let of = self.bins.iter().flatten().enumerate();
         of.flat_map(move |(bin, &(position, i))| {
             let b = &self.reading.bins[position][i];
             let means = b.channels.iter().enumerate();
-            means.filter_map(move |(channel, m)| Some((Key { position, bin, channel }, (*m)?, b)))
+            means.filter_map(move |(channel, m)| Some((MeasurementKey { position, bin, channel }, (*m)?, b)))
         })
     }
 
@@ -281,9 +282,9 @@ impl Run {
         conditions: &Conditions,
         x0: &PlatformState,
     ) -> Result<Vec<Tilt>, CalibrationError> {
-        let filter = Extended::new(&self.plan, conditions, Update::default())?;
+        let filter = ExtendedFilter::new(&self.plan, conditions, Update::default())?;
         let mut x = x0.clone();
-        let tilt = |(k, s): (usize, &Segment)| filter.motion(k).tilt(0.0, s.dt, &mut x);
+        let tilt = |(k, s): (usize, &PlanSegment)| filter.motion(k).tilt(0.0, s.dt, &mut x);
         Ok(self.plan.segments.iter().enumerate().map(tilt).collect::<Result<_, _>>()?)
     }
 
@@ -297,7 +298,7 @@ impl Run {
         conditions: &Conditions,
         sigmas: &[f64],
         x0: &PlatformState,
-    ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
+    ) -> Result<(Linearised, Vec<MeasurementKey>), CalibrationError> {
         self.along_parts(conditions, sigmas, x0, &[])
     }
 
@@ -312,8 +313,8 @@ impl Run {
         sigmas: &[f64],
         x0: &PlatformState,
         nodes: &[(usize, PlatformState)],
-    ) -> Result<(Linearised, Vec<Key>), CalibrationError> {
-        let filter = Extended::new(&self.plan, conditions, Update::default())?;
+    ) -> Result<(Linearised, Vec<MeasurementKey>), CalibrationError> {
+        let filter = ExtendedFilter::new(&self.plan, conditions, Update::default())?;
         let mut out = Linearised::default();
         let mut along = RunLinearisation::new(self, sigmas, &filter, x0);
         let mut nodes = nodes.iter().peekable();
@@ -342,27 +343,32 @@ impl Run {
 
 /// Linearisation of a run, segment by segment.
 struct RunLinearisation<'a> {
-    run: &'a Run,
+    run: &'a RecordedRun,
     /// Standard deviations of a sample, by channel.
     sigmas: &'a [f64],
-    filter: &'a Extended<'a>,
+    filter: &'a ExtendedFilter<'a>,
     /// State of the trajectory, and its time in s.
     x: PlatformState,
     now: f64,
     /// Index of the next bin.
     bin: usize,
     residuals: Vec<f64>,
-    keys: Vec<Key>,
+    keys: Vec<MeasurementKey>,
     second: Option<SecondDerivatives>,
     /// Changes of position that follow, and the drift (1/s) before the next, carried to the trajectory's time.
-    changes: Peekable<std::slice::Iter<'a, Change>>,
+    changes: Peekable<std::slice::Iter<'a, PositionChange>>,
     drift: Vec<f64>,
     scratch: Vec<f64>,
 }
 
 impl<'a> RunLinearisation<'a> {
     /// Linearisation before the first segment, from `x0`.
-    fn new(run: &'a Run, sigmas: &'a [f64], filter: &'a Extended<'a>, x0: &PlatformState) -> Self {
+    fn new(
+        run: &'a RecordedRun,
+        sigmas: &'a [f64],
+        filter: &'a ExtendedFilter<'a>,
+        x0: &PlatformState,
+    ) -> Self {
         Self {
             run,
             sigmas,
@@ -411,7 +417,7 @@ impl<'a> RunLinearisation<'a> {
                 _ => 0.0,
             };
             self.residuals.push(mean.value - h[channel] - bend * mean.bend);
-            self.keys.push(Key { position, bin, channel });
+            self.keys.push(MeasurementKey { position, bin, channel });
         }
         self.bin += 1;
         Ok(outputs)

@@ -10,11 +10,11 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_ekf::{Manifold, Update};
-use obsdeg_evidence::simulation::{Conditions, Extended, PlatformState, SegmentKind};
+use obsdeg_evidence::simulation::{Conditions, ExtendedFilter, PlatformState, SegmentKind};
 
 use super::CalibrationError;
-use super::estimate::{Problem, TURN, WEAK, largest_turn};
-use super::run::Run;
+use super::estimate::{PlatformProblem, TURN, WEAK, largest_turn};
+use super::run::RecordedRun;
 
 /// Most passes.
 const PASSES: usize = 40;
@@ -26,7 +26,7 @@ const FEWEST: usize = 4;
 const SETTLED: f64 = 1e-5;
 
 /// Run in parts: its start, and the segments at which later parts begin, with their attitudes.
-struct Parts {
+struct DividedRun {
     start: PlatformState,
     nodes: Vec<(usize, PlatformState)>,
 }
@@ -46,7 +46,7 @@ fn at_zero(points: &[(f64, f64)]) -> Option<f64> {
     r.solve_upper_triangular(&(q.transpose() * b)).map(|x| x[0])
 }
 
-impl Run {
+impl RecordedRun {
     /// Gravity in n as measured at the beginning of the first of some segments, by the bins in all of them;
     /// `None` without enough measurements.
     fn gravity(&self, segments: &[usize]) -> Option<[f64; 3]> {
@@ -77,9 +77,13 @@ impl Run {
     }
 
     /// Run in parts, each levelled by its measurements, or beginning from `start` where there are none.
-    fn in_parts(&self, conditions: &Conditions, start: &PlatformState) -> Result<Parts, CalibrationError> {
-        let filter = Extended::new(&self.plan, conditions, Update::default())?;
-        let mut out = Parts { start: start.clone(), nodes: Vec::new() };
+    fn in_parts(
+        &self,
+        conditions: &Conditions,
+        start: &PlatformState,
+    ) -> Result<DividedRun, CalibrationError> {
+        let filter = ExtendedFilter::new(&self.plan, conditions, Update::default())?;
+        let mut out = DividedRun { start: start.clone(), nodes: Vec::new() };
         let mut seen = vec![false; start.attitudes()];
         for position in 0..self.reading.bins.len() {
             let within = |k: &usize| {
@@ -108,7 +112,7 @@ impl Run {
     }
 }
 
-impl Problem<'_> {
+impl PlatformProblem<'_> {
     /// Starts of all runs by multiple shooting, with constants from those of `x`. If the work is stopped, the
     /// current starts; `None` if the parts do not converge.
     ///
@@ -116,7 +120,7 @@ impl Problem<'_> {
     /// [`CalibrationError`] for a number that is not finite.
     pub(super) fn shoot(&self, x: &[PlatformState]) -> Result<Option<Vec<PlatformState>>, CalibrationError> {
         let each = self.runs.iter().zip(x).map(|(run, x)| run.in_parts(self.conditions, x));
-        let mut parts = each.collect::<Result<Vec<Parts>, _>>()?;
+        let mut parts = each.collect::<Result<Vec<DividedRun>, _>>()?;
         for _ in 0..PASSES {
             if self.stopped.get() {
                 return Ok(Some(parts.into_iter().map(|p| p.start).collect()));
@@ -166,7 +170,7 @@ mod tests {
 
     /// Three positions with turns of 1 deg/s between them, and a minimal record. Each sample is a bin:
     /// the rows omit the curvature within bins.
-    fn run(terms: &str) -> (Run, Conditions, Vec<f64>) {
+    fn run(terms: &str) -> (RecordedRun, Conditions, Vec<f64>) {
         let attitudes = ["NUE", "ENU", "DSW"].map(|a| parse_attitude(a).expect("an attitude"));
         let mut scheme = Scheme { carry: Carry::Inertial, ..Scheme::of_angles(attitudes) };
         scheme.unknowns = terms.parse().expect("terms");
@@ -189,11 +193,11 @@ mod tests {
         let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text))).expect("a record");
         let sigmas = vec![1e-5; plan.components.len()];
         let reading = observe(record, &plan, 9.80665, 50.0, sigmas.clone(), &|_| true).expect("read");
-        (Run::new(reading, &scheme, &plan, &conditions).expect("a run"), conditions, sigmas)
+        (RecordedRun::new(reading, &scheme, &plan, &conditions).expect("a run"), conditions, sigmas)
     }
 
     /// A start far from zero: psi 10 deg, drifts 13 deg/h and 5 deg/h/g, all other unknowns 3e-4.
-    fn far(run: &Run) -> PlatformState {
+    fn far(run: &RecordedRun) -> PlatformState {
         let size = |unit: &str| match unit {
             "rad" => 10f64.to_radians() / 3f64.sqrt(),
             "deg/h" => 13.0 * si_per_shown(unit),
@@ -261,7 +265,7 @@ mod tests {
         let zero = PlatformState::of_unknowns(&vec![0.0; run.plan.states()], run.plan.constants());
         let parts = run.in_parts(&conditions, &zero).expect("parts");
         assert_eq!(parts.nodes.len(), 3 * PARTS - 1);
-        let filter = Extended::new(&run.plan, &conditions, Update::default()).expect("coefficients");
+        let filter = ExtendedFilter::new(&run.plan, &conditions, Update::default()).expect("coefficients");
         let motion = filter.motion(0);
         let seen = [0.3, -0.9, -0.2];
         let length = seen.iter().map(|x| x * x).sum::<f64>().sqrt();

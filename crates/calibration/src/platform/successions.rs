@@ -2,10 +2,10 @@
 //! platform that moved, and no outliers, which are independent of each other.
 
 use super::CalibrationError;
-use super::diagnose::Parts;
+use super::diagnose::AnswerData;
 use super::gross::GrossReason;
 use super::placed::channel_name;
-use super::run::Run;
+use super::run::RecordedRun;
 use crate::answer::{Finding, Outlier};
 
 /// Least number of measurements of a succession.
@@ -15,7 +15,7 @@ const APART: usize = 2;
 
 /// Measurement that was left out.
 #[derive(Debug, Clone)]
-pub(super) struct LeftOut {
+pub(super) struct LeftOutMeasurement {
     pub outlier: Outlier,
     position: usize,
     /// Index among the rows of its position or the bins of the run; `None` for a sample of a dense bin, where
@@ -23,13 +23,13 @@ pub(super) struct LeftOut {
     place: Option<usize>,
 }
 
-impl Parts<'_> {
+impl AnswerData<'_> {
     /// Measurements that were left out: single cells, then samples of dense bins, then bins, each with its
     /// distance from the value expected without it.
     ///
     /// # Errors
     /// [`CalibrationError`] for a number that is not finite.
-    pub(super) fn left_out(&self) -> Result<Vec<LeftOut>, CalibrationError> {
+    pub(super) fn left_out(&self) -> Result<Vec<LeftOutMeasurement>, CalibrationError> {
         let mut out = Vec::new();
         let channel = |c: usize| channel_name(self.planned.components[c]);
         for (run, x) in self.problem.runs.iter().zip(&self.estimate.at.x) {
@@ -44,16 +44,16 @@ impl Parts<'_> {
             let at = |t: f64| reading.stays.iter().rposition(|stay| stay.0 <= t).unwrap_or(0);
             for (cell, column) in reading.cells.iter().filter(|(c, _)| c.why == GrossReason::Far) {
                 let outlier = outlier(cell.lines, cell.t, column.clone(), cell.sigmas);
-                out.push(LeftOut { position: at(cell.t), place: cell.row, outlier });
+                out.push(LeftOutMeasurement { position: at(cell.t), place: cell.row, outlier });
             }
             for s in &reading.spikes {
                 let outlier = outlier((s.line, s.line), s.t, channel(s.channel), s.sigmas);
-                out.push(LeftOut { position: at(s.t), place: None, outlier });
+                out.push(LeftOutMeasurement { position: at(s.t), place: None, outlier });
             }
             if run.counts.iter().flatten().all(|counts| *counts) {
                 continue;
             }
-            let mut all: Run = run.clone();
+            let mut all: RecordedRun = run.clone();
             all.counts.iter_mut().flatten().for_each(|counts| *counts = true);
             let (along, _) = all.along(self.problem.conditions, &self.problem.sigmas, x)?;
             let each = run.measured().zip(along.residuals);
@@ -61,18 +61,19 @@ impl Parts<'_> {
                 let sigma = self.problem.sigmas[key.channel];
                 let own = (mean.variance * if mean.given { 1.0 } else { sigma * sigma }).sqrt();
                 let outlier = outlier(bin.lines, bin.t, channel(key.channel), off / own);
-                out.push(LeftOut { position: key.position, place: Some(key.bin), outlier });
+                out.push(LeftOutMeasurement { position: key.position, place: Some(key.bin), outlier });
             }
         }
         Ok(out)
     }
 
     /// Findings on successions among the measurements that were left out.
-    pub(super) fn successions(&self, left_out: &[LeftOut]) -> Vec<Finding> {
-        let mut all: Vec<&LeftOut> = left_out.iter().collect();
-        let group = |l: &LeftOut| (l.outlier.record.clone(), l.outlier.channel.clone(), l.position);
+    pub(super) fn successions(&self, left_out: &[LeftOutMeasurement]) -> Vec<Finding> {
+        let mut all: Vec<&LeftOutMeasurement> = left_out.iter().collect();
+        let group =
+            |l: &LeftOutMeasurement| (l.outlier.record.clone(), l.outlier.channel.clone(), l.position);
         all.sort_by_key(|l| (group(l), l.place));
-        let together = |a: &&LeftOut, b: &&LeftOut| {
+        let together = |a: &&LeftOutMeasurement, b: &&LeftOutMeasurement| {
             let apart = a.place.zip(b.place).map(|(a, b)| b.abs_diff(a));
             group(a) == group(b)
                 && apart.is_some_and(|steps| steps <= APART)
@@ -82,7 +83,7 @@ impl Parts<'_> {
         found
             .map(|run| {
                 let sigmas = || run.iter().map(|l| l.outlier.sigmas.abs());
-                let end = |l: &LeftOut| l.outlier.t_s;
+                let end = |l: &LeftOutMeasurement| l.outlier.t_s;
                 let sign = run[0].outlier.sigmas.signum();
                 Finding::Succession {
                     record: run[0].outlier.record.clone(),

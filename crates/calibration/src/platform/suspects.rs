@@ -12,18 +12,19 @@ use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{OmittedModel, OmittedTerm, Platform};
 use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts, omitted_verdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
-use obsdeg_ekf::{Covariance, EkfError, Form, Gains};
+use obsdeg_ekf::{Covariance, CovarianceForm, EkfError, Gains};
 use obsdeg_evidence::simulation::omitted::{
-    Bench, ChangePerUnit, Explanation, OmittedColumns, Score, SuspectedChange, SuspectedError, Suspicion,
+    Bench, ChangePerUnit, OmittedColumns, ResidualExplanation, Score, SuspectedChange, SuspectedError,
+    Suspicion,
 };
 use obsdeg_evidence::simulation::{
     Attained, Conditions, SegmentKind, SimulationError, Tilt, is_rate, shown_unit, si_per_shown,
 };
 
 use super::CalibrationError;
-use super::estimate::{Estimate, Problem};
+use super::estimate::{PlatformEstimate, PlatformProblem};
 use super::offset::Later;
-use super::run::{Key, Run};
+use super::run::{MeasurementKey, RecordedRun};
 use crate::answer::{Estimated, Omitted, SilentError};
 use crate::least_squares::Linearised;
 use crate::levels;
@@ -71,8 +72,8 @@ pub(super) struct FamilyChange {
 /// # Errors
 /// [`CalibrationError`] for a number that is not finite.
 pub(super) fn omitted(
-    problem: &Problem<'_>,
-    estimate: &Estimate,
+    problem: &PlatformProblem<'_>,
+    estimate: &PlatformEstimate,
     quantities: &[Estimated],
     later: &[Option<Later>],
     (bench, seed): (&[Assignment], u64),
@@ -197,8 +198,8 @@ impl Tested {
 }
 
 fn tested(
-    problem: &Problem<'_>,
-    estimate: &Estimate,
+    problem: &PlatformProblem<'_>,
+    estimate: &PlatformEstimate,
     model: &OmittedModel,
     shown: Vec<bool>,
     later: &[Option<Later>],
@@ -252,7 +253,7 @@ type Passed = (Vec<f64>, Vec<f64>);
 
 impl<'a> DiffuseFilter<'a> {
     /// Filter along the run `r`.
-    fn new(problem: &Problem<'_>, r: usize, linear: &'a Linearised) -> Result<Self, EkfError> {
+    fn new(problem: &PlatformProblem<'_>, r: usize, linear: &'a Linearised) -> Result<Self, EkfError> {
         let own = problem.runs[r].plan.unknowns();
         let prior = problem.unknowns.index[r]
             .iter()
@@ -261,7 +262,7 @@ impl<'a> DiffuseFilter<'a> {
         let prior: Vec<f64> = prior.collect();
         let n = prior.len();
         let variances = nalgebra::DVector::from_iterator(n, prior.iter().map(|s| s * s));
-        let covariance = Covariance::new("P0", &DMatrix::from_diagonal(&variances), Form::Ud)?;
+        let covariance = Covariance::new("P0", &DMatrix::from_diagonal(&variances), CovarianceForm::Ud)?;
         let gains = covariance_pass(&linear.stages, covariance, |_, _| {})?;
         Ok(Self { linear, gains, n })
     }
@@ -317,9 +318,9 @@ fn add_products(score: &mut Score, own: &[f64], passed: &[Passed]) {
 
 /// Columns of all errors in the measurements of a run, in their order, at these tilts.
 fn columns(
-    run: &Run,
+    run: &RecordedRun,
     model: &OmittedModel,
-    keys: &[Key],
+    keys: &[MeasurementKey],
     tilts: Vec<Tilt>,
 ) -> Result<Vec<Vec<f64>>, CalibrationError> {
     let m = model.terms().len();
@@ -334,13 +335,15 @@ fn columns(
             of_bins.push(last);
         }
     }
-    let entry = |j: usize, key: &Key| of_bins.get(key.bin).and_then(|b| b.get(key.channel * m + j)).copied();
+    let entry = |j: usize, key: &MeasurementKey| {
+        of_bins.get(key.bin).and_then(|b| b.get(key.channel * m + j)).copied()
+    };
     Ok((0..m).map(|j| keys.iter().map(|k| entry(j, k).unwrap_or(0.0)).collect()).collect())
 }
 
 /// The suspicion in names and units, and the largest change of each coefficient by it, in its shown unit.
 fn suspicion(
-    found: &Explanation,
+    found: &ResidualExplanation,
     model: &OmittedModel,
     tested: &Tested,
     quantities: &[Estimated],
@@ -376,7 +379,11 @@ fn suspicion(
 }
 
 /// Changes of the estimates by suspected errors, the largest in sigma first.
-fn suspected_changes(found: &Explanation, tested: &Tested, quantities: &[Estimated]) -> Vec<SuspectedChange> {
+fn suspected_changes(
+    found: &ResidualExplanation,
+    tested: &Tested,
+    quantities: &[Estimated],
+) -> Vec<SuspectedChange> {
     // each error of a group explains the residuals as well, and may change the estimates differently
     let alone = |&j: &usize| vec![(j, tested.score.against[j] / tested.score.products[(j, j)])];
     let best: Vec<(usize, f64)> =

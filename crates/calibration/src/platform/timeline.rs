@@ -4,7 +4,7 @@
 //! A row labelled with a position lies inside it, so the first and the last row of every position bound the
 //! beginning of the scheme. If these bounds contain zero, the clock of the record is that of the scheme.
 
-use obsdeg_evidence::simulation::{Plan, Segment, SegmentKind};
+use obsdeg_evidence::simulation::{Plan, PlanSegment, SegmentKind};
 
 use super::clock::bounds;
 
@@ -86,7 +86,7 @@ fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f
 /// Duration of the slew to each position, in s.
 pub(crate) fn slews(plan: &Plan) -> Vec<f64> {
     let of = |p: usize| {
-        let slew = |s: &&Segment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
+        let slew = |s: &&PlanSegment| s.position == p && matches!(s.kind, SegmentKind::Slew(_));
         plan.segments.iter().filter(slew).map(|s| s.dt * s.steps as f64).sum()
     };
     (0..plan.attitudes.len()).map(of).collect()
@@ -138,7 +138,7 @@ pub(crate) fn narrow(stays: &mut [(f64, f64)], plan: &Plan, slews: &[f64]) {
 
 /// Interval without rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Gap {
+pub(crate) struct RowGap {
     /// Times of the rows before (`from`) and after it, in s of the record's clock.
     pub from: f64,
     pub to: f64,
@@ -152,10 +152,10 @@ pub(crate) struct Gap {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Intervals {
     /// First intervals, kept until the usual one is known.
-    first: Vec<Gap>,
+    first: Vec<RowGap>,
     usual: Option<f64>,
     last: Option<(f64, Option<usize>)>,
-    found: Vec<Gap>,
+    found: Vec<RowGap>,
 }
 
 /// Number of intervals from which the usual interval is taken.
@@ -165,7 +165,7 @@ impl Intervals {
     /// Adds a row.
     pub(crate) fn push(&mut self, t: f64, line: u64, position: Option<usize>) {
         if let Some((from, before)) = self.last.replace((t, position)) {
-            let gap = Gap { from, to: t, line, between: [before, position] };
+            let gap = RowGap { from, to: t, line, between: [before, position] };
             match self.usual {
                 Some(usual) => self.keep(gap, usual),
                 None => {
@@ -178,7 +178,7 @@ impl Intervals {
         }
     }
 
-    fn keep(&mut self, gap: Gap, usual: f64) {
+    fn keep(&mut self, gap: RowGap, usual: f64) {
         if gap.to - gap.from > GAP * usual && self.found.len() < MOST {
             self.found.push(gap);
         }
@@ -197,13 +197,13 @@ impl Intervals {
 
     /// Usual interval in s (one second for a single row), and the gaps; a slew within a gap does not count as
     /// missing rows.
-    pub(crate) fn finish(mut self, plan: &Plan) -> (f64, Vec<Gap>) {
+    pub(crate) fn finish(mut self, plan: &Plan) -> (f64, Vec<RowGap>) {
         if self.usual.is_none() {
             self.end();
         }
         let usual = self.usual.unwrap_or(1.0);
         let slews = slews(plan);
-        let slew = |g: &Gap| match g.between {
+        let slew = |g: &RowGap| match g.between {
             [Some(p), Some(q)] if q > p => (p + 1..=q).map(|k| slews[k]).sum(),
             _ => 0.0,
         };

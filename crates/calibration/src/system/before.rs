@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::answer::SystemCalibrationError;
 use super::constraints::bound_and_free;
-use super::fit::{Problem, size};
+use super::fit::{SystemProblem, size};
 use crate::answer::CovarianceTable;
 
 /// Relative variance, by the trace, below which a direction counts as constrained by the prior calibration.
@@ -16,7 +16,7 @@ const HELD: f64 = 1e-14;
 pub(super) fn said_before(
     table: &CovarianceTable,
     names: &[&str],
-    problem: &Problem<'_>,
+    problem: &SystemProblem<'_>,
     base: &DVector<f64>,
 ) -> Result<(DMatrix<f64>, DVector<f64>), SystemCalibrationError> {
     let nothing = || SystemCalibrationError::Prior { found: table.names.join(", ") };

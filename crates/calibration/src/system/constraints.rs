@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, DVectorView};
 use obsdeg_ekf::EkfError;
 use obsdeg_ekf::decomposition::singular_values;
 
-use super::fit::{Problem, size};
+use super::fit::{SystemProblem, size};
 
 /// Most steps back to a point where the constraints hold.
 const BACK: usize = 30;
@@ -31,7 +31,7 @@ struct ConstraintResiduals {
     terms: Vec<f64>,
 }
 
-impl Problem<'_> {
+impl SystemProblem<'_> {
     fn left(&self, base: &DVector<f64>, x: &DVector<f64>, fixed: Option<usize>) -> ConstraintResiduals {
         let all = self.all(base, x);
         let (over, by_all) = self.numeric.constraints(&all);

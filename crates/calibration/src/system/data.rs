@@ -8,7 +8,7 @@ use obsdeg_core::system::{KnownInput, ModelError, StartTime, StateStart, SystemM
 use super::answer::{StatesStart, SystemCalibrationError};
 use super::units;
 use crate::Going;
-use crate::record::{MOST, Record, RecordError, Row, Wanted};
+use crate::record::{MOST, Record, RecordError, RecordRow, Wanted};
 use crate::still::Detector;
 
 /// Interval of progress reports, in samples.
@@ -219,7 +219,7 @@ impl RowReader<'_> {
     }
 
     /// Adds a row.
-    fn take(&mut self, row: &Row<'_>) -> Result<(), SystemCalibrationError> {
+    fn take(&mut self, row: &RecordRow<'_>) -> Result<(), SystemCalibrationError> {
         let experiment = self.experiment(row)?;
         let t = row.numbers[0].unwrap_or(f64::NAN);
         let (_, time) = self.reached[experiment];
@@ -244,7 +244,7 @@ impl RowReader<'_> {
     }
 
     /// Index of the experiment of a row.
-    fn experiment(&self, row: &Row<'_>) -> Result<usize, SystemCalibrationError> {
+    fn experiment(&self, row: &RecordRow<'_>) -> Result<usize, SystemCalibrationError> {
         if self.columns.label.is_none() {
             return Ok(0);
         }
@@ -256,7 +256,7 @@ impl RowReader<'_> {
     }
 
     /// Index of the segment of a row. An experiment may continue behind rows of another.
-    fn segment(&self, row: &Row<'_>, experiment: usize) -> Result<usize, SystemCalibrationError> {
+    fn segment(&self, row: &RecordRow<'_>, experiment: usize) -> Result<usize, SystemCalibrationError> {
         let (last, time) = self.reached[experiment];
         let Some(i) = self.columns.segment else { return Ok(last) };
         let first = time == f64::NEG_INFINITY;
@@ -272,7 +272,7 @@ impl RowReader<'_> {
     }
 
     /// Standard deviation in a requested number of a row; `None` where there is none.
-    fn sigma(&self, row: &Row<'_>, i: Option<usize>) -> Result<Option<f64>, SystemCalibrationError> {
+    fn sigma(&self, row: &RecordRow<'_>, i: Option<usize>) -> Result<Option<f64>, SystemCalibrationError> {
         match i.and_then(|i| Some((i, row.numbers[i]?))) {
             Some((i, s)) if s <= 0.0 => {
                 Err(self.refuse(row.line, &self.texts[i], s.to_string(), "a standard deviation above zero"))
@@ -282,7 +282,7 @@ impl RowReader<'_> {
     }
 
     /// Values of the inputs in a row, with their standard deviations.
-    fn inputs(&self, row: &Row<'_>) -> Result<Vec<(f64, f64)>, SystemCalibrationError> {
+    fn inputs(&self, row: &RecordRow<'_>) -> Result<Vec<(f64, f64)>, SystemCalibrationError> {
         let mut out = Vec::new();
         for &(_, from) in &self.columns.inputs {
             let InputSource::Column(i, s) = from else {

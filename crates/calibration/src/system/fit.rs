@@ -8,7 +8,7 @@ use obsdeg_evidence::system::Numeric;
 
 use super::data::{Data, Read};
 use crate::Going;
-use crate::least_squares::{Rows, Solution};
+use crate::least_squares::{LeastSquaresSolution, StackedRows};
 
 /// Most iterations from a start.
 const PASSES: usize = 200;
@@ -22,7 +22,7 @@ const SETTLED: f64 = 1e-5;
 pub(super) const WEAK: f64 = 1e7;
 
 /// Model with its data.
-pub(super) struct Problem<'a> {
+pub(super) struct SystemProblem<'a> {
     pub(super) numeric: Numeric<'a>,
     pub(super) data: &'a Read,
     /// Filter states that are estimated.
@@ -44,7 +44,7 @@ pub(super) struct Problem<'a> {
 }
 
 /// Rows of the model at some unknowns: derivatives by the free unknowns, residuals, and sigmas.
-pub(super) struct At {
+pub(super) struct ModelRows {
     pub(super) rows: DMatrix<f64>,
     pub(super) left: DVector<f64>,
     pub(super) sigmas: Vec<f64>,
@@ -52,13 +52,13 @@ pub(super) struct At {
     pub(super) keys: Vec<(usize, usize)>,
     /// Rows and residuals of the prior information, with unit errors.
     pub(super) known: (DMatrix<f64>, DVector<f64>),
-    /// Directions in which the unknowns are free ([`Problem::ways`]).
+    /// Directions in which the unknowns are free ([`SystemProblem::ways`]).
     pub(super) ways: DMatrix<f64>,
 }
 
 /// Filter states along a run of the data.
 #[derive(Debug, Clone)]
-struct Trajectory {
+struct ModelTrajectory {
     /// Number of the run; `None` at the start, before the first.
     run: Option<usize>,
     /// Time from the start of the states.
@@ -71,14 +71,14 @@ struct Trajectory {
     segment: usize,
 }
 
-impl Trajectory {
+impl ModelTrajectory {
     /// Trajectory at its start.
     fn from_start(x: DVector<f64>, by_free: DMatrix<f64>) -> Self {
         Self { run: None, t: 0.0, x, by_free, segment: 0 }
     }
 }
 
-impl At {
+impl ModelRows {
     /// Sum of squares in sigma.
     pub(super) fn cost(&self) -> f64 {
         self.cost_by(&self.sigmas)
@@ -91,7 +91,7 @@ impl At {
     }
 }
 
-impl Problem<'_> {
+impl SystemProblem<'_> {
     /// All filter states at the free values `x`; known starts follow from the others.
     pub(super) fn all(&self, base: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
         let mut out = base.clone();
@@ -118,11 +118,16 @@ impl Problem<'_> {
     }
 
     /// Rows of the model at the free values `x`, with integration steps `1/finer` as long.
-    pub(super) fn at(&mut self, base: &DVector<f64>, x: &DVector<f64>, finer: usize) -> Result<At, EkfError> {
+    pub(super) fn at(
+        &mut self,
+        base: &DVector<f64>,
+        x: &DVector<f64>,
+        finer: usize,
+    ) -> Result<ModelRows, EkfError> {
         self.passes += 1;
         self.stopped |= !(self.going)(Going::Passes(self.passes));
-        let start = Trajectory::from_start(self.all(base, x), self.of_free(base, x));
-        let mut out = At {
+        let start = ModelTrajectory::from_start(self.all(base, x), self.of_free(base, x));
+        let mut out = ModelRows {
             rows: DMatrix::zeros(0, 0),
             left: DVector::zeros(0),
             sigmas: Vec::new(),
@@ -179,14 +184,14 @@ impl Problem<'_> {
     }
 
     /// Trajectory at the start of the run of a row.
-    fn begin(&self, start: &Trajectory, row: &Data) -> Trajectory {
+    fn begin(&self, start: &ModelTrajectory, row: &Data) -> ModelTrajectory {
         let (x, by) = self.numeric.carry(self.part(row, 0), 0.0, &start.x);
-        Trajectory { run: Some(row.run), t: 0.0, x, by_free: by * &start.by_free, segment: 0 }
+        ModelTrajectory { run: Some(row.run), t: 0.0, x, by_free: by * &start.by_free, segment: 0 }
     }
 
     /// Carries a trajectory to the time and the segment of a row. Inputs hold until there the values of the
     /// row before. A segment begins with its first row.
-    fn carry_to(&self, now: &mut Trajectory, row: &Data, finer: usize) -> Result<(), EkfError> {
+    fn carry_to(&self, now: &mut ModelTrajectory, row: &Data, finer: usize) -> Result<(), EkfError> {
         if row.t > now.t {
             let process = self.numeric.process(self.part(row, now.segment));
             let steps = ((row.t - now.t) / self.longest).ceil().max(1.0) as usize * finer;
@@ -230,11 +235,11 @@ pub(super) fn size(x: f64) -> f64 {
 
 /// Step from `at`, with a pull of `pull` per size of an unknown, along the directions that constraints leave
 /// free. The root of the solution refers to these directions.
-pub(super) fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, EkfError> {
+pub(super) fn step(at: &ModelRows, x: &DVector<f64>, pull: f64) -> Result<LeastSquaresSolution, EkfError> {
     let mut ways = at.ways.clone();
     ways.row_iter_mut().zip(x.iter()).for_each(|(mut row, x)| row.scale_mut(size(*x)));
     let n = ways.ncols();
-    let mut rows = Rows::new(n);
+    let mut rows = StackedRows::new(n);
     let mut whitened = &at.rows * &ways;
     whitened.row_iter_mut().zip(&at.sigmas).for_each(|(mut row, s)| row.scale_mut(1.0 / s));
     let left = at.left.zip_map(&DVector::from_column_slice(&at.sigmas), |e, s| e / s);
@@ -242,7 +247,7 @@ pub(super) fn step(at: &At, x: &DVector<f64>, pull: f64) -> Result<Solution, Ekf
     rows.add(&(&at.known.0 * &ways), &at.known.1);
     rows.add(&(DMatrix::identity(n, n) * pull), &DVector::zeros(n));
     let found = rows.solve()?;
-    Ok(Solution { x: &ways * found.x, inverse_root: &ways * found.inverse_root, ..found })
+    Ok(LeastSquaresSolution { x: &ways * found.x, inverse_root: &ways * found.inverse_root, ..found })
 }
 
 /// Reason why an iteration does not end.
@@ -270,13 +275,13 @@ pub(super) struct Settled {
 
 /// Levenberg-Marquardt from `x`; the unknown `fixed` stays.
 pub(super) fn settle(
-    problem: &mut Problem<'_>,
+    problem: &mut SystemProblem<'_>,
     base: &DVector<f64>,
     mut x: DVector<f64>,
     finer: usize,
     fixed: Option<usize>,
 ) -> Result<Settled, Stuck> {
-    let there = |problem: &mut Problem<'_>, x: &DVector<f64>| -> Result<At, EkfError> {
+    let there = |problem: &mut SystemProblem<'_>, x: &DVector<f64>| -> Result<ModelRows, EkfError> {
         let mut at = problem.at(base, x, finer)?;
         if let Some(j) = fixed {
             at.rows.column_mut(j).fill(0.0);
@@ -324,20 +329,20 @@ pub(super) fn settle(
 }
 
 /// Change of the outputs by a step, in sigma.
-pub(super) fn determined_part(at: &At, solution: &Solution) -> f64 {
+pub(super) fn determined_part(at: &ModelRows, solution: &LeastSquaresSolution) -> f64 {
     let moved = &at.rows * &solution.x;
     let measured: f64 = moved.iter().zip(&at.sigmas).map(|(m, s)| (m / s).powi(2)).sum();
     (measured + (&at.known.0 * &solution.x).norm_squared()).sqrt()
 }
 
 /// Leverage of a measurement: the fraction of it that the fit follows.
-pub(super) fn leverage(at: &At, solution: &Solution, i: usize) -> f64 {
+pub(super) fn leverage(at: &ModelRows, solution: &LeastSquaresSolution, i: usize) -> f64 {
     let row = at.rows.row(i) * &solution.inverse_root;
     (row.norm() / at.sigmas[i]).powi(2)
 }
 
 /// Number of combinations that the data determine; only the pull holds the others.
-pub(super) fn rank(solution: &Solution) -> usize {
+pub(super) fn rank(solution: &LeastSquaresSolution) -> usize {
     // relative to sizes, singular values of the root are those of the pull, or far larger
     let values = singular_values(&solution.root).map(|(v, _)| v).unwrap_or_default();
     values.iter().filter(|v| **v > 10.0 / WEAK).count()

@@ -29,13 +29,13 @@ pub use answer::{
 
 use crate::Going;
 use crate::answer::{Before, CovarianceTable};
-use crate::least_squares::Solution;
+use crate::least_squares::LeastSquaresSolution;
 use crate::levels;
 use crate::record::Record;
 use crate::setup::Basis;
 use before::said_before;
 use data::{Read, before_first_row, read};
-use fit::{At, LONG, Problem, Settled, Stuck, WEAK, leverage, rank, settle, size, step};
+use fit::{LONG, ModelRows, Settled, Stuck, SystemProblem, WEAK, leverage, rank, settle, size, step};
 
 /// Name and version of the JSON layout.
 const SCHEMA: &str = "obsdeg.system-calibration/1";
@@ -118,10 +118,10 @@ impl FreeUnknowns {
 struct FinalFit {
     best: Settled,
     /// Rows at the solution.
-    at: At,
-    solution: Solution,
+    at: ModelRows,
+    solution: LeastSquaresSolution,
     /// Solution with a pull ten times as weak.
-    weaker: Solution,
+    weaker: LeastSquaresSolution,
     /// True for each free unknown that model and record determine.
     determined: Vec<bool>,
     degrees_of_freedom: usize,
@@ -176,7 +176,7 @@ struct Calibrating<'a> {
     compiled: &'a Compiled,
     data: &'a Read,
     options: &'a SystemOptions,
-    problem: Problem<'a>,
+    problem: SystemProblem<'a>,
     /// All filter states at the first start.
     base: DVector<f64>,
     /// True for each output whose noise is estimated.
@@ -202,8 +202,18 @@ impl<'a> Calibrating<'a> {
         let (longest, found) = integration_steps(model, data)?;
         let known = (DMatrix::zeros(0, free.len()), DVector::zeros(0));
         let long = found + data.rows.len() as f64 > LONG;
-        let mut problem =
-            Problem { numeric, data, free, noise, longest, known, long, going, passes: 0, stopped: false };
+        let mut problem = SystemProblem {
+            numeric,
+            data,
+            free,
+            noise,
+            longest,
+            known,
+            long,
+            going,
+            passes: 0,
+            stopped: false,
+        };
         if let Some(before) = &options.prior {
             let names: Vec<&str> = problem.free.iter().map(|&i| problem.numeric.names[i].as_str()).collect();
             problem.known = said_before(&before.estimates, &names, &problem, &base)?;
@@ -536,7 +546,7 @@ impl<'a> Calibrating<'a> {
     }
 
     /// Factors on the noise of the outputs: 1 where it is given.
-    fn factors(&self, at: &At, x: &DVector<f64>) -> Result<Vec<f64>, EkfError> {
+    fn factors(&self, at: &ModelRows, x: &DVector<f64>) -> Result<Vec<f64>, EkfError> {
         let solution = step(at, x, 1.0 / WEAK)?;
         let of = |j: usize| {
             let own = (0..at.keys.len()).filter(|&i| at.keys[i].1 == j);
@@ -553,7 +563,7 @@ impl<'a> Calibrating<'a> {
         &mut self,
         names: &[String],
         best: &Settled,
-        solution: &Solution,
+        solution: &LeastSquaresSolution,
         finer: usize,
     ) -> Result<Vec<Profile>, SystemCalibrationError> {
         let mut out = Vec::new();

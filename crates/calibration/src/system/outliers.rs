@@ -4,13 +4,13 @@ use obsdeg_ekf::consistency::{chi_square_quantile, student_quantile};
 
 use super::Calibrating;
 use super::answer::{OutputFit, SystemFinding, SystemResidual};
-use super::fit::{At, leverage};
-use crate::least_squares::Solution;
+use super::fit::{ModelRows, leverage};
+use crate::least_squares::LeastSquaresSolution;
 use crate::levels;
 use crate::white;
 
 impl Calibrating<'_> {
-    pub(super) fn residuals(&self, at: &At, solution: &Solution) -> Vec<SystemResidual> {
+    pub(super) fn residuals(&self, at: &ModelRows, solution: &LeastSquaresSolution) -> Vec<SystemResidual> {
         let of = |(i, &(k, output)): (usize, &(usize, usize))| {
             let row = &self.data.rows[k];
             let free = (1.0 - leverage(at, solution, i)).max(1e-9);
@@ -31,8 +31,8 @@ impl Calibrating<'_> {
     pub(super) fn outputs(
         &self,
         residuals: &[SystemResidual],
-        at: &At,
-        solution: &Solution,
+        at: &ModelRows,
+        solution: &LeastSquaresSolution,
     ) -> Vec<OutputFit> {
         let of = |j: usize| {
             let own: Vec<&SystemResidual> = residuals.iter().filter(|r| r.output == j).collect();

@@ -6,7 +6,7 @@ use obsdeg_evidence::simulation::Noise;
 use super::Calibrating;
 use super::answer::{OtherSolution, OtherStarts};
 use super::fit::{Settled, Stuck, settle, size};
-use crate::least_squares::Solution;
+use crate::least_squares::LeastSquaresSolution;
 
 /// Difference in sigma of the determined unknowns below which two solutions are the same.
 const SAME: f64 = 1e-2;
@@ -101,7 +101,7 @@ impl Calibrating<'_> {
         ends: &[Settled],
         best: &Settled,
         determined: &[bool],
-        solution: &Solution,
+        solution: &LeastSquaresSolution,
         mean: f64,
         finer: usize,
     ) -> (Vec<OtherSolution>, usize, OtherStarts) {

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use obsdeg_core::model::slew::Slew;
 use obsdeg_core::model::{Dwell, Platform, Position, Scheme, SlewTo, angles_text, c_n_f64};
-use obsdeg_evidence::requirements::{Basis, RequirementClaim, Miss, Requirements, Worst};
+use obsdeg_evidence::requirements::{Basis, Miss, RequirementClaim, Requirements, Worst};
 use obsdeg_evidence::simulation::{Attained, Conditions, KnownCovariance, SimulationError, is_rate, resolve};
 
 use super::answer::{AddedPosition, AttitudeBound, Meeting, Quickest, Standing};

@@ -4,7 +4,7 @@ use obsdeg_core::accuracy::Accuracy;
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
 use obsdeg_core::degree::{Degrees, EnsembleError, Status, judge, local_chain};
 use obsdeg_core::model::{
-    Angle, Carry, PSI_EPS, Platform, RandomValues, Sample, Scheme, Unknowns, cardinal, cardinal_names,
+    Angle, Carry, FieldSample, PSI_EPS, Platform, RandomValues, Scheme, Unknowns, cardinal, cardinal_names,
     parse_attitude,
 };
 use obsdeg_exact::{Echelon, SplitMix64};
@@ -24,12 +24,12 @@ pub(super) fn positions(attitudes: &[&str]) -> Scheme {
 }
 
 /// Scheme with the degrees of its unknowns.
-pub(super) struct JudgedScheme {
+pub(super) struct SchemeDegrees {
     names: Vec<String>,
     degrees: Degrees,
 }
 
-impl JudgedScheme {
+impl SchemeDegrees {
     pub(super) fn of(scheme: Scheme, seed: u64) -> Result<Self, AnalysisError> {
         let platform = Platform::new(scheme)?;
         Ok(Self { names: platform.names().to_vec(), degrees: judge(&platform, seed)?.degrees })
@@ -66,7 +66,7 @@ pub(super) fn show(d: Option<usize>) -> String {
 /// Number of random samples of the platform at generic angles, each in a field of its own.
 const SAMPLES: usize = 4;
 
-fn samples(platform: &Platform, seed: u64) -> Result<Vec<Sample>, AnalysisError> {
+fn samples(platform: &Platform, seed: u64) -> Result<Vec<FieldSample>, AnalysisError> {
     let mut rng = SplitMix64::new(seed);
     let draw = |_| {
         let values = RandomValues::draw(platform.scheme(), &mut rng).map_err(EnsembleError::from)?;
@@ -197,7 +197,7 @@ pub(super) const PAPER: [&str; 2] = ["0,0,0", "180,0,0"];
 /// [`AuditError`].
 pub(super) fn section_2(seed: u64) -> Result<Vec<Line>, AuditError> {
     let mut out = Vec::from(separation_lines(seed)?);
-    let p1p2 = JudgedScheme::of(positions(&PAPER), seed)?;
+    let p1p2 = SchemeDegrees::of(positions(&PAPER), seed)?;
     out.push(first_derivative_line(&p1p2, seed)?);
     out.push(two_positions_line(seed)?);
     out.push(zero_order_line(&p1p2, seed)?);
@@ -241,9 +241,9 @@ fn separation_lines(seed: u64) -> Result<[Line; 3], AnalysisError> {
 }
 
 /// Claim on the coefficients that need Z''.
-fn first_derivative_line(p1p2: &JudgedScheme, seed: u64) -> Result<Line, AnalysisError> {
+fn first_derivative_line(p1p2: &SchemeDegrees, seed: u64) -> Result<Line, AnalysisError> {
     let one_order = |n: usize, carry: Carry| -> Result<bool, AnalysisError> {
-        let judged = JudgedScheme::of(generic(n, carry), seed)?;
+        let judged = SchemeDegrees::of(generic(n, carry), seed)?;
         Ok(judged.of_coefficients(|name| !input_axis(name)).iter().all(|d| *d == Some(1)))
     };
     // None: not with fewer than `ATTITUDES` positions
@@ -290,7 +290,7 @@ fn two_positions_line(seed: u64) -> Result<Line, AnalysisError> {
     let together = everywhere(ANY, seed, |at| Ok(at.value(&squares)? == at.field.one()))?;
     let (mut suffice, mut fail) = (Vec::new(), Vec::new());
     for carry in Carry::ALL {
-        let judged = JudgedScheme::of(generic(2, carry), seed)?;
+        let judged = SchemeDegrees::of(generic(2, carry), seed)?;
         let mut psi = judged.names.iter().zip(&judged.degrees.degree).filter(|(n, _)| n.starts_with("psi"));
         let list = if psi.all(|(_, d)| d.is_some()) { &mut suffice } else { &mut fail };
         list.push(carry.to_string());
@@ -315,11 +315,11 @@ fn two_positions_line(seed: u64) -> Result<Line, AnalysisError> {
 }
 
 /// Claim on the degree of eps_z - wN psi_y(0).
-fn zero_order_line(p1p2: &JudgedScheme, seed: u64) -> Result<Line, AnalysisError> {
+fn zero_order_line(p1p2: &SchemeDegrees, seed: u64) -> Result<Line, AnalysisError> {
     let local = single_position(seed)?;
-    let six = [Carry::Platform, Carry::Inertial].map(|carry| JudgedScheme::of(generic(6, carry), seed));
-    let of_biases = |j: &JudgedScheme| ["D_FX", "D_FY", "D_FZ"].map(|n| j.degree(n));
-    let same = |j: &JudgedScheme| of_biases(j).iter().all(|d| *d == local.combination);
+    let six = [Carry::Platform, Carry::Inertial].map(|carry| SchemeDegrees::of(generic(6, carry), seed));
+    let of_biases = |j: &SchemeDegrees| ["D_FX", "D_FY", "D_FZ"].map(|n| j.degree(n));
+    let same = |j: &SchemeDegrees| of_biases(j).iter().all(|d| *d == local.combination);
     let [platform, inertial] = six;
     let enough = same(&platform?) && same(&inertial?);
     let list = of_biases(p1p2).map(show).join(", ");
@@ -379,7 +379,7 @@ fn single_position(seed: u64) -> Result<LocalDegrees, AnalysisError> {
 
 /// Claims of section 3.3 about segment 1 that need no filter.
 pub(super) fn segment_1(seed: u64) -> Result<[Line; 2], AnalysisError> {
-    let p1 = JudgedScheme::of(positions(&PAPER[..1]), seed)?;
+    let p1 = SchemeDegrees::of(positions(&PAPER[..1]), seed)?;
     let psi_y = p1.degree("psi_y");
     let named = ["D_FX", "D_FY", "D_FZ", "D_SX", "D_IY", "D_SZ"];
     let inseparable = named.iter().all(|n| p1.status(n) == Some(Status::Inseparable));
@@ -444,7 +444,7 @@ fn degrees_are_two(seed: u64) -> Result<bool, AnalysisError> {
     let cardinals = || Scheme::of_angles(cardinal_names().iter().filter_map(|n| cardinal(n)));
     for carry in Carry::ALL {
         for scheme in [generic(12, carry), Scheme { carry, ..cardinals() }] {
-            let judged = JudgedScheme::of(scheme, seed)?;
+            let judged = SchemeDegrees::of(scheme, seed)?;
             tried &= judged.of_coefficients(input_axis).iter().all(|d| d.is_none_or(|k| k == 2));
         }
     }

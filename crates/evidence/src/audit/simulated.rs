@@ -8,11 +8,11 @@ use obsdeg_core::model::settings::{FilterKind, Propagation, Truth};
 use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, Scheme};
 
-use super::claims::{JudgedScheme, PAPER, positions, segment_1, show};
+use super::claims::{PAPER, SchemeDegrees, positions, segment_1, show};
 use super::{AuditError, Finding, Line, finding, line};
 use crate::prediction::Prediction;
 use crate::simulation::conditions::Conditions;
-use crate::simulation::record::{Record, RunStart, Series, run};
+use crate::simulation::record::{RunRecord, RunStart, Series, run};
 use crate::simulation::{Plan, SimulationError, simulate};
 
 /// Relative limit, by the true value at the start, for error and sigma of an estimate that has converged.
@@ -34,7 +34,7 @@ fn scheme(carry: Carry) -> Scheme {
 /// Run of the filter; [`MeanRun::of`] makes it without noise in truth and samples.
 struct MeanRun {
     plan: Plan,
-    record: Record,
+    record: RunRecord,
 }
 
 impl MeanRun {
@@ -110,7 +110,7 @@ fn is_about(found: f64, expected: f64) -> bool {
 /// Lines about section 3.3.
 pub(super) fn lines(seed: u64) -> Result<Vec<Line>, AuditError> {
     let means = Carry::ALL.map(|carry| MeanRun::of(carry, seed));
-    let degrees = Carry::ALL.map(|carry| JudgedScheme::of(scheme(carry), seed));
+    let degrees = Carry::ALL.map(|carry| SchemeDegrees::of(scheme(carry), seed));
     let ([platform, inertial, reset], [p, i, r]) = (means, degrees);
     let carries = [(platform?, p?), (inertial?, i?), (reset?, r?)];
     let (mean, _) = &carries[0];
@@ -175,11 +175,11 @@ fn under(holds: [bool; 3]) -> Finding {
     }
 }
 
-type Carries = [(MeanRun, JudgedScheme); 3];
+type Carries = [(MeanRun, SchemeDegrees); 3];
 
 /// Phrases of all carries, joined.
-fn each(carries: &Carries, phrase: impl Fn(&MeanRun, &JudgedScheme) -> String) -> String {
-    let one = |(carry, (mean, judged)): (Carry, &(MeanRun, JudgedScheme))| {
+fn each(carries: &Carries, phrase: impl Fn(&MeanRun, &SchemeDegrees) -> String) -> String {
+    let one = |(carry, (mean, judged)): (Carry, &(MeanRun, SchemeDegrees))| {
         format!("{}, {carry} carry", phrase(mean, judged))
     };
     Carry::ALL.into_iter().zip(carries).map(one).collect::<Vec<_>>().join("; ")
@@ -187,10 +187,10 @@ fn each(carries: &Carries, phrase: impl Fn(&MeanRun, &JudgedScheme) -> String) -
 
 fn fast(carries: &Carries) -> Line {
     let names = ["D_FX", "D_SX", "D_SZ"];
-    let holds = |(mean, judged): &(MeanRun, JudgedScheme)| {
+    let holds = |(mean, judged): &(MeanRun, SchemeDegrees)| {
         names.iter().all(|n| judged.degree(n).is_some() && mean.quick(n, 1))
     };
-    let lost = |judged: &JudgedScheme| -> String {
+    let lost = |judged: &SchemeDegrees| -> String {
         let lost = names.iter().filter(|n| judged.degree(n).is_none()).copied();
         let lost = lost.collect::<Vec<_>>().join(", ");
         if lost.is_empty() { "all observable".into() } else { format!("{lost} not observable") }
@@ -212,7 +212,7 @@ fn offset(carries: &Carries) -> Line {
     let dph = |rate: f64| rate.to_degrees() * 3600.0;
     let expected = -dph(mean.plan.point.w_n) * start;
     let end = |mean: &MeanRun| mean.error("D_FZ", mean.record.traces.time.len() - 1);
-    let holds = |(mean, _): &(MeanRun, JudgedScheme)| mean.quick("D_FZ", 1) && is_about(end(mean), expected);
+    let holds = |(mean, _): &(MeanRun, SchemeDegrees)| mean.quick("D_FZ", 1) && is_about(end(mean), expected);
     let last = mean.record.traces.time.len() - 1;
     line(
         "section 3.3",
@@ -236,7 +236,7 @@ fn slow(carries: &Carries) -> Line {
         let last = mean.record.traces.time.len() - 1;
         time(s) > time(f) && mean.sigma(s, last) > mean.sigma(f, last)
     };
-    let holds = |(mean, judged): &(MeanRun, JudgedScheme)| {
+    let holds = |(mean, judged): &(MeanRun, SchemeDegrees)| {
         let better = fast.iter().all(|f| judged.degree(f).is_none_or(|k| k < 2));
         better && slow.iter().all(|s| judged.degree(s) == Some(2) && fast.iter().all(|f| later(mean, [s, f])))
     };

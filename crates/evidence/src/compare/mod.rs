@@ -9,10 +9,10 @@ use std::collections::BTreeMap;
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::slew::W_IE;
-use obsdeg_core::model::{Carry, ErrorTerm, Float, Matrix3, Platform, Position, Scheme, Source, slew};
+use obsdeg_core::model::{Carry, ErrorSource, ErrorTerm, Float, Matrix3, Platform, Position, Scheme, slew};
 use obsdeg_exact::parallel;
 
-use crate::requirements::{Claim, Miss};
+use crate::requirements::{Miss, RequirementClaim};
 use crate::simulation::answer::MeasurementReport;
 use crate::simulation::carries::under;
 use crate::simulation::conditions::{Conditions, resolve, shown_unit, si_per_shown};
@@ -202,8 +202,12 @@ fn quantities(
             sigma_extended: None,
             requirement,
             total: judged.totals[c].filter(|_| judged.has_bench()),
-            margin: Claim { name, required: requirement, sigma: judged.totals[c].ok_or(Miss::NotObservable) }
-                .margin(),
+            margin: RequirementClaim {
+                name,
+                required: requirement,
+                sigma: judged.totals[c].ok_or(Miss::NotObservable),
+            }
+            .margin(),
             excitation: excitation(c),
             carried_by: carries.map(|d| d.position.clone()).collect(),
         }
@@ -220,7 +224,7 @@ fn excitations(judged: &Attained) -> Vec<Vec<f64>> {
         let rows = plan.drift_rows(c, None);
         let seen = platform.errors().accelerometer_rows(&Float, c);
         // torquers: rates in units of the earth rate
-        let unit = |t: &ErrorTerm| if t.source == Source::Rate { W_IE } else { 1.0 };
+        let unit = |t: &ErrorTerm| if t.source == ErrorSource::Rate { W_IE } else { 1.0 };
         let square = |(d, t): (usize, &ErrorTerm)| -> f64 {
             rows.iter().chain(&seen).map(|r| (r[d] / unit(t)).powi(2)).sum()
         };

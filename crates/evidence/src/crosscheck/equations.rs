@@ -6,7 +6,7 @@ use obsdeg_ekf::{Measurement, Motion, Update};
 use super::answer::{Agreement, Difference};
 use crate::simulation::SimulationError;
 use crate::simulation::conditions::Conditions;
-use crate::simulation::extended::Extended;
+use crate::simulation::extended::ExtendedFilter;
 use crate::simulation::plan::Plan;
 use crate::simulation::state::PlatformState;
 
@@ -26,7 +26,7 @@ pub(super) fn difference(
     if !plan.has_coefficients() || plan.torqued_at_once() {
         return Ok(None);
     }
-    let filter = Extended::new(plan, conditions, Update::default())?;
+    let filter = ExtendedFilter::new(plan, conditions, Update::default())?;
     let n = plan.states();
     let zero = PlatformState::of_unknowns(&vec![0.0; n], plan.constants());
     let mut largest = 0.0f64;

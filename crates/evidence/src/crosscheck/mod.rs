@@ -20,14 +20,14 @@ mod structure;
 mod summary;
 
 pub use answer::*;
-pub use monte_carlo::{Experiment, Prepared, Totals};
+pub use monte_carlo::{MonteCarloExperiment, PreparedExperiment, Totals};
 pub use ranking::kendall_tau_b;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::Truth;
 use obsdeg_core::model::{Carry, Latitude, Matrix3, Platform, Position, Scheme};
 use obsdeg_ekf::consistency::chi_square_band;
-use obsdeg_ekf::{Form, SquareRootInformation};
+use obsdeg_ekf::{CovarianceForm, SquareRootInformation};
 use obsdeg_exact::parallel;
 
 use crate::prediction::Prediction;
@@ -42,8 +42,8 @@ use structure::{last_covariance, still, structure};
 use summary::{disagreements, misfits, outcomes, unresolved};
 
 /// Largest relative difference of covariances that rounding causes; P itself has half the digits of its root.
-const COVARIANCE_LIMITS: [(Form, &str, f64); 2] =
-    [(Form::Ud, "UD form", 1e-6), (Form::Joseph, "Joseph form", 1e-4)];
+const COVARIANCE_LIMITS: [(CovarianceForm, &str, f64); 2] =
+    [(CovarianceForm::Ud, "UD form", 1e-6), (CovarianceForm::Joseph, "Joseph form", 1e-4)];
 /// Statements of an analysis that the cross-check does not test.
 const NOT_TESTED: [&str; 7] = [
     "solving expressions (the analysis verifies them by substitution) and formulas of Z",
@@ -209,7 +209,7 @@ fn against(
     let mut covariance = covariances(&filter_scheme, &filter_conditions)?;
     covariance.extend(equations::difference(truth, conditions)?);
 
-    let experiment = Experiment {
+    let experiment = MonteCarloExperiment {
         filter: &filter,
         truth,
         conditions,
@@ -258,11 +258,11 @@ fn against(
 /// # Errors
 /// [`SimulationError`]; `Interrupted` when `progress` returns false.
 fn evidence_of_runs(
-    experiment: Experiment<'_>,
+    experiment: MonteCarloExperiment<'_>,
     runs: usize,
     progress: &dyn Fn(usize) -> bool,
 ) -> Result<(MonteCarlo, Vec<f64>), SimulationError> {
-    let prepared = Prepared::new(experiment)?;
+    let prepared = PreparedExperiment::new(experiment)?;
     let totals = prepared.run(runs, progress);
     if totals.runs < runs {
         return Err(SimulationError::Interrupted);
@@ -333,7 +333,7 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
             (0..n * n).map(relative).fold(0.0, |a: f64, b| if b <= a || a.is_nan() { a } else { b });
         // P loses, step by step, the digits by which the largest variance, that of the prior, exceeds the
         // smallest
-        let coarse = form == Form::Joseph && wider * f64::EPSILON * steps as f64 > limit / 10.0;
+        let coarse = form == CovarianceForm::Joseph && wider * f64::EPSILON * steps as f64 > limit / 10.0;
         let outcome = match difference <= limit {
             true => Agreement::Agrees,
             false if coarse => Agreement::NotResolvable,
@@ -411,7 +411,8 @@ fn controls(
             continue;
         }
         let name = format!("filter {}", change.words(scheme));
-        let experiment = Experiment { filter: &filter, truth: &truth, conditions, null_space: None, seed };
+        let experiment =
+            MonteCarloExperiment { filter: &filter, truth: &truth, conditions, null_space: None, seed };
         out.extend(control(name, *off_deg, counts?, experiment)?);
     }
     Ok(out)
@@ -445,10 +446,10 @@ fn control(
     name: String,
     off_deg: f64,
     (failed, checks): (usize, usize),
-    experiment: Experiment<'_>,
+    experiment: MonteCarloExperiment<'_>,
 ) -> Result<Option<Control>, SimulationError> {
-    let Experiment { truth, filter, conditions, .. } = experiment;
-    let prepared = Prepared::new(experiment)?;
+    let MonteCarloExperiment { truth, filter, conditions, .. } = experiment;
+    let prepared = PreparedExperiment::new(experiment)?;
     let by_data = |runs| prepared.statistics(&prepared.run(runs, &|_| true)).pop();
     let Some(mut nis) = by_data(CONTROL_RUNS) else { return Ok(None) };
     if failed == 0 && nis.pass {

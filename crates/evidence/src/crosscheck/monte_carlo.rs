@@ -8,14 +8,14 @@ use nalgebra::DMatrix;
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::consistency::{Nees, chi_square_band};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
-use obsdeg_ekf::{Covariance, Form, Gains, Manifold, Update};
+use obsdeg_ekf::{Covariance, CovarianceForm, Gains, Manifold, Update};
 use obsdeg_exact::parallel;
 
 use super::answer::{HistoryPoint, Statistic};
 use crate::simulation::SimulationError;
 use crate::simulation::answer::Validity;
 use crate::simulation::conditions::Conditions;
-use crate::simulation::extended::Extended;
+use crate::simulation::extended::ExtendedFilter;
 use crate::simulation::iterated::iterated;
 use crate::simulation::plan::Plan;
 use crate::simulation::record::{RunStart, choose, first_steps, largest_psi, sample};
@@ -31,7 +31,7 @@ const CHUNK: usize = 8;
 const BATCH: usize = 32;
 
 /// Filter and truth of a Monte Carlo experiment.
-pub struct Experiment<'a> {
+pub struct MonteCarloExperiment<'a> {
     /// Model of the filter.
     pub filter: &'a Plan,
     /// Model of the truth, on the same timeline.
@@ -103,8 +103,8 @@ impl Totals {
 }
 
 /// Data common to all runs: gains, and factors of the covariance at the checkpoints.
-pub struct Prepared<'a> {
-    experiment: Experiment<'a>,
+pub struct PreparedExperiment<'a> {
+    experiment: MonteCarloExperiment<'a>,
     gains: Gains,
     start: RunStart,
     truth_start: RunStart,
@@ -118,12 +118,12 @@ pub struct Prepared<'a> {
     kind: FilterKind,
 }
 
-impl<'a> Prepared<'a> {
+impl<'a> PreparedExperiment<'a> {
     /// Prepares an experiment: runs the covariance pass.
     ///
     /// # Errors
     /// [`SimulationError`].
-    pub fn new(experiment: Experiment<'a>) -> Result<Self, SimulationError> {
+    pub fn new(experiment: MonteCarloExperiment<'a>) -> Result<Self, SimulationError> {
         let (filter, conditions) = (experiment.filter, experiment.conditions);
         let start = RunStart::new(filter, &conditions.within(&filter.platform))?;
         let same = filter.platform.names() == experiment.truth.platform.names();
@@ -143,7 +143,7 @@ impl<'a> Prepared<'a> {
         let points = CHECKPOINTS.min(total);
         let checkpoints: Vec<usize> = (1..=points).map(|i| (i * total).div_ceil(points) - 1).collect();
         let mut covariances = Vec::with_capacity(points);
-        let gains = covariance_pass(&filter.stages, start.covariance(Form::Ud)?, |step, p| {
+        let gains = covariance_pass(&filter.stages, start.covariance(CovarianceForm::Ud)?, |step, p| {
             if checkpoints.binary_search(&step).is_ok() {
                 covariances.push(p.clone());
             }
@@ -217,9 +217,9 @@ impl<'a> Prepared<'a> {
 
     /// Sums over the runs `from..to` of a filter with full attitudes.
     fn exact(&self, from: usize, to: usize) -> Totals {
-        let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
+        let MonteCarloExperiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
         let mut totals = Totals::none(self.checkpoints.len());
-        let extended = Extended::new(filter, conditions, Update::default())
+        let extended = ExtendedFilter::new(filter, conditions, Update::default())
             .expect("an exact truth has coefficients, and so has the filter of the same unknowns");
         let constants = plan.constants();
         let (mut start, mut from_truth, mut z) =
@@ -279,7 +279,7 @@ impl<'a> Prepared<'a> {
 
     /// Sums over the runs `from..to` of the linear filter.
     fn linear(&self, from: usize, to: usize) -> Totals {
-        let Experiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
+        let MonteCarloExperiment { truth: plan, filter, conditions, seed, .. } = &self.experiment;
         let mut totals = Totals::none(self.checkpoints.len());
         let mut drawn = self.truth_start.estimate.clone();
         let mut truth = TruthModel::new(plan, conditions, drawn.clone());
@@ -422,8 +422,8 @@ impl<'a> Prepared<'a> {
 }
 
 /// Kind of the filter that is compared with the truth: the one that a single run would use.
-fn kind(experiment: &Experiment<'_>, same: bool) -> Result<FilterKind, SimulationError> {
-    let Experiment { filter, truth, conditions, seed, .. } = experiment;
+fn kind(experiment: &MonteCarloExperiment<'_>, same: bool) -> Result<FilterKind, SimulationError> {
+    let MonteCarloExperiment { filter, truth, conditions, seed, .. } = experiment;
     // a deliberately wrong filter is wrong in its linear model
     if conditions.truth != Truth::Exact || !same || filter.stages != truth.stages {
         return Ok(FilterKind::Linear);

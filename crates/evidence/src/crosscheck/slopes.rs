@@ -17,7 +17,7 @@ const SAMPLES: f64 = 50.0;
 
 /// Sigmas of functionals against the dwell.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Slopes {
+pub(crate) struct DwellSigmas {
     /// Dwells of the first position, ascending, in s.
     pub dwells: Vec<f64>,
     /// Sigmas by functional, then by dwell, in SI units.
@@ -26,7 +26,11 @@ pub(crate) struct Slopes {
 
 /// Sigmas of `functionals` of the initial unknowns of `scheme`, without drift noise and with a diffuse prior.
 /// Dwells that doubles do not resolve are left out.
-pub(crate) fn slopes(scheme: &Scheme, conditions: &Conditions, functionals: &[Vec<(usize, f64)>]) -> Slopes {
+pub(crate) fn slopes(
+    scheme: &Scheme,
+    conditions: &Conditions,
+    functionals: &[Vec<(usize, f64)>],
+) -> DwellSigmas {
     let plan = |dwell: f64| -> Result<Plan, SimulationError> {
         let (scheme, conditions) = scaled(scheme, conditions, dwell)?;
         Plan::derived(&scheme, &conditions)
@@ -35,7 +39,7 @@ pub(crate) fn slopes(scheme: &Scheme, conditions: &Conditions, functionals: &[Ve
         let prior = SquareRootInformation::prior(&diffuse_prior(&plan(PRIOR_AT)?)?)?;
         Ok(batch(&plan(dwell)?, prior)?.information.inverse_root()?)
     };
-    let mut out = Slopes { dwells: Vec::new(), sigmas: vec![Vec::new(); functionals.len()] };
+    let mut out = DwellSigmas { dwells: Vec::new(), sigmas: vec![Vec::new(); functionals.len()] };
     for (dwell, root) in SHOWN.into_iter().filter_map(|dwell| Some((dwell, root(dwell).ok()?))) {
         out.dwells.push(dwell);
         for (s, functional) in out.sigmas.iter_mut().zip(functionals) {

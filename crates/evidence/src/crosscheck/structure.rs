@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use obsdeg_core::degree::Status;
 use obsdeg_core::model::{Carry, Latitude, Scheme, Unknowns};
 use obsdeg_ekf::decomposition::singular_values;
-use obsdeg_ekf::{Covariance, Form, SquareRootInformation};
+use obsdeg_ekf::{Covariance, CovarianceForm, SquareRootInformation};
 use obsdeg_exact::parallel;
 
 use super::answer::{
@@ -28,7 +28,7 @@ const NOTHING: f64 = 1e-14;
 const UNSEEN: f64 = 1e-10;
 
 /// Evidence a and b, with the outcomes of their checks.
-pub(super) struct Structure {
+pub(super) struct StructureEvidence {
     pub(super) quantities: Vec<QuantityEvidence>,
     pub(super) spaces: Vec<SpaceCheck>,
     pub(super) null_space: Vec<NullEvidence>,
@@ -56,7 +56,7 @@ pub(super) fn outcomes(
     missing.chain(measured).chain(null.flatten()).chain(spaces).chain([defect.outcome])
 }
 
-impl Structure {
+impl StructureEvidence {
     /// Counts of the outcomes of its checks.
     pub(super) fn counts(&self) -> Counts {
         Counts::of(outcomes(&self.quantities, &self.spaces, &self.null_space, &self.defect))
@@ -70,7 +70,7 @@ pub(super) fn structure(
     prediction: &Prediction,
     filter_scheme: &Scheme,
     conditions: &Conditions,
-) -> Result<Structure, SimulationError> {
+) -> Result<StructureEvidence, SimulationError> {
     let conditions = &still(conditions);
     let filter = Plan::derived(filter_scheme, conditions)?;
     let names = names(truth, prediction);
@@ -100,7 +100,7 @@ pub(super) fn structure(
         spaces.extend(spaces::spaces(prediction, shown.derivatives.as_ref(), &is_psi));
         spaces.push(spaces::with_dwells(prediction, shown.with_dwells(), hidden, partial, &is_psi));
     }
-    Ok(Structure {
+    Ok(StructureEvidence {
         quantities,
         spaces,
         null_space,
@@ -274,7 +274,11 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<InflationFactor
     let prior = diffuse_prior(plan)?;
     let end = |factor: f64| {
         let sigma = prior.iter().map(|s| s * factor).collect();
-        last_covariance(plan, &RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }, Form::Ud)
+        last_covariance(
+            plan,
+            &RunStart { truth: Vec::new(), estimate: Vec::new(), sigma },
+            CovarianceForm::Ud,
+        )
     };
     let (small, large) = (end(1.0)?, end(10.0)?);
     let ratio = |c: &Combination| Ok((large.variance(c)? / small.variance(c)?).sqrt());
@@ -292,7 +296,7 @@ fn inflation(plan: &Plan, functionals: &[Combination]) -> Result<InflationFactor
 pub(super) fn last_covariance(
     plan: &Plan,
     start: &RunStart,
-    form: Form,
+    form: CovarianceForm,
 ) -> Result<Covariance, SimulationError> {
     Ok(obsdeg_ekf::linear::last_covariance(&plan.stages, start.covariance(form)?)?)
 }
@@ -535,7 +539,7 @@ fn curves(
     prediction: &Prediction,
     names: &[String],
     functionals: &[Option<Combination>],
-    measured: &slopes::Slopes,
+    measured: &slopes::DwellSigmas,
 ) -> Vec<SlopeCurve> {
     let orders = prediction.unknowns.iter().map(|u| u.accuracy_order);
     let orders = orders.chain(prediction.combinations.iter().map(|c| c.accuracy_order));

@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, RowDVector};
 use obsdeg_core::model::{OmittedModel, Scheme};
 use obsdeg_ekf::linear::last_covariance;
-use obsdeg_ekf::{Covariance, EkfError, Form, SquareRootInformation};
+use obsdeg_ekf::{Covariance, CovarianceForm, EkfError, SquareRootInformation};
 
 use super::batch::{Batch, batch};
 use super::conditions::{Conditions, PRIOR, REQUIRED, is_rate, resolve, si_per_shown};
@@ -18,7 +18,7 @@ use super::plan::Plan;
 use super::seen::{no_prior, predict};
 use super::start::RunStart;
 use crate::prediction::Prediction;
-use crate::requirements::{Claim, Miss, Requirements, Worst};
+use crate::requirements::{Miss, RequirementClaim, Requirements, Worst};
 use crate::simulation::omitted::bench::Bench;
 use crate::simulation::omitted::weights::{self, Influence};
 
@@ -223,7 +223,7 @@ impl Attained {
         let conditions = conditions.within(&self.plan.platform);
         let required = resolve(REQUIRED, &self.plan.platform, &conditions.requirements, f64::NAN)?;
         let names = self.plan.platform.names();
-        let claims = (0..names.len()).map(|c| Claim {
+        let claims = (0..names.len()).map(|c| RequirementClaim {
             name: &names[c],
             required: Some(required[c]).filter(|r| !r.is_nan()),
             sigma: self.totals[c].ok_or(Miss::NotObservable),
@@ -272,7 +272,7 @@ pub(crate) fn run_contributions(
         return Ok(DMatrix::zeros(n, 0));
     }
     let own = model.only(&kept);
-    let changes = weights::by_filter(plan, &own, start.covariance(Form::Ud)?)?.changes;
+    let changes = weights::by_filter(plan, &own, start.covariance(CovarianceForm::Ud)?)?.changes;
     let size = |e: usize| sizes[kept[e]].unwrap_or(0.0) * si_per_shown(own.terms()[e].unit);
     Ok(DMatrix::from_fn(n, kept.len(), |c, e| changes[(c, e)] * size(e)))
 }
@@ -314,16 +314,16 @@ fn filter_prior(
         let mut wide = DMatrix::zeros(rows.nrows(), sigma.len());
         wide.view_mut((0, 0), (rows.nrows(), n)).copy_from(rows);
         information.add(&wide)?;
-        return Ok(Covariance::new("P0", &information.covariance()?, Form::Ud)?);
+        return Ok(Covariance::new("P0", &information.covariance()?, CovarianceForm::Ud)?);
     }
-    RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)
+    RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(CovarianceForm::Ud)
 }
 
 #[cfg(test)]
 mod tests {
     use obsdeg_core::model::scheme_file;
 
-    use super::super::plan::{Segment, SegmentKind, left_out};
+    use super::super::plan::{PlanSegment, SegmentKind, left_out};
     use super::*;
 
     /// Samples that are left out count as samples of a noise a million times larger do, also for the bench:
@@ -343,7 +343,7 @@ mod tests {
             for settle_s in [20.0, 47.0, 150.0] {
                 let settling = Conditions { settle_s, ..all.clone() };
                 let found = Attained::new(&scheme, &settling, 1).expect("sigmas");
-                let parts = |s: &Segment| {
+                let parts = |s: &PlanSegment| {
                     let first = left_out(settle_s, s.dt);
                     vec![(first, s.dt), (s.steps - first, s.dt)]
                 };

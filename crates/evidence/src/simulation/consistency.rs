@@ -141,7 +141,7 @@ impl Consistency {
 
 #[cfg(test)]
 mod tests {
-    use obsdeg_ekf::Form;
+    use obsdeg_ekf::CovarianceForm;
     use obsdeg_exact::SplitMix64;
 
     use super::*;
@@ -149,7 +149,7 @@ mod tests {
 
     /// Consistency of a run of two outputs and two states, with errors given in sigma.
     fn judged(whitened: &[f64], error: [f64; 2]) -> Consistency {
-        let p = Covariance::new("P", &DMatrix::identity(2, 2), Form::Ud).expect("a covariance");
+        let p = Covariance::new("P", &DMatrix::identity(2, 2), CovarianceForm::Ud).expect("a covariance");
         let run = Outcomes {
             whitened,
             outputs: 2,

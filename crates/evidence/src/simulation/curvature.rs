@@ -15,9 +15,9 @@
 //! Garcia-Fernandez, Svensson, Morelande, Sarkka 2015, doi:10.1109/TSP.2015.2454485).
 
 use nalgebra::DMatrix;
-use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Stage};
+use obsdeg_ekf::{Covariance, CovarianceForm, EkfError, Manifold, Stage};
 
-use super::extended::Extended;
+use super::extended::ExtendedFilter;
 use super::state::PlatformState;
 use super::trajectory::Trajectory;
 
@@ -43,7 +43,7 @@ impl SecondOrderTerms {
     /// # Errors
     /// [`EkfError`] for a trajectory that ends in numbers that are not finite.
     pub(super) fn new(
-        filter: &Extended<'_>,
+        filter: &ExtendedFilter<'_>,
         x0: &PlatformState,
         (stages, at): (&[Stage], &Trajectory),
         p: &DMatrix<f64>,
@@ -128,14 +128,14 @@ impl SecondOrderTerms {
         to.view_mut((0, n), (n, self.columns())).copy_from(&bent.columns(1, self.columns()));
         let x = &to * DMatrix::from_column_slice(delta.len(), 1, delta) + bent.column(0);
         let p = &to * p.matrix() * to.transpose();
-        Ok((x.as_slice().to_vec(), Covariance::new("P", &((&p + p.transpose()) / 2.0), Form::Ud)?))
+        Ok((x.as_slice().to_vec(), Covariance::new("P", &((&p + p.transpose()) / 2.0), CovarianceForm::Ud)?))
     }
 }
 
 /// Second differences along `directions` of the outputs of a run, then of its states, about the trajectory `at`
 /// from `x0`: those of the mean, and a column for each direction and each pair.
 fn second_differences(
-    filter: &Extended<'_>,
+    filter: &ExtendedFilter<'_>,
     x0: &PlatformState,
     at: &Trajectory,
     directions: &[Vec<f64>],

@@ -20,10 +20,10 @@ use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::slew::{apply, cross, rotation_vector, times, transpose};
-use obsdeg_core::model::{AZIMUTH, Carry, ErrorTerm, Matrix3, SignedAxis, Source};
+use obsdeg_core::model::{AZIMUTH, Carry, ErrorSource, ErrorTerm, Matrix3, SignedAxis};
 use obsdeg_ekf::{
-    Covariance, EkfError, Filter, Form, Manifold, Measurement, Motion, ProcessNoise, Stage, Transition,
-    Update,
+    Covariance, CovarianceForm, EkfError, Filter, Manifold, Measurement, Motion, ProcessNoise, Stage,
+    Transition, Update,
 };
 use obsdeg_exact::interrupt;
 
@@ -51,8 +51,8 @@ fn errors<'a>(
     terms: &[ErrorTerm],
     weights: &[f64],
     d: &[f64],
-    of: impl Fn(Source) -> Option<&'a [f64; 3]>,
-    by: Source,
+    of: impl Fn(ErrorSource) -> Option<&'a [f64; 3]>,
+    by: ErrorSource,
     by_d: &mut Vec<(usize, f64)>,
 ) -> Errors {
     let mut out = Errors { sum: [0.0; 3], slope: [[0.0; 3]; 3] };
@@ -139,12 +139,12 @@ impl PlatformMotion<'_> {
         let back = transpose(&c);
         let g = apply(&back, &G_N);
         let torqued = self.plan.torqued_rate(&computed, self.plan.turns(self.segment));
-        let of = |source: Source| match source {
-            Source::Gravity => Some(&g),
-            Source::Rate => Some(&torqued),
-            Source::Force => None,
+        let of = |source: ErrorSource| match source {
+            ErrorSource::Gravity => Some(&g),
+            ErrorSource::Rate => Some(&torqued),
+            ErrorSource::Force => None,
         };
-        let drift = errors(self.terms, weights, d, of, Source::Gravity, by_d);
+        let drift = errors(self.terms, weights, d, of, ErrorSource::Gravity, by_d);
         let (turned, eps) = (apply(e, &earth), apply(&c, &drift.sum));
         let rate: [f64; 3] = std::array::from_fn(|i| turned[i] - earth[i] + eps[i]);
         // -omega x + C Gamma C^T [g x]
@@ -180,9 +180,9 @@ impl PlatformMotion<'_> {
             return (c, Errors { sum: [0.0; 3], slope: [[0.0; 3]; 3] }, by_k);
         }
         let force = apply(&transpose(&times(e, &c)), &G_N).map(|x| -x);
-        let of = |source: Source| (source == Source::Force).then_some(&force);
+        let of = |source: ErrorSource| (source == ErrorSource::Force).then_some(&force);
         let weights = vec![1.0; x.constants.len()];
-        let found = errors(self.terms, &weights, &x.constants, of, Source::Force, &mut by_k);
+        let found = errors(self.terms, &weights, &x.constants, of, ErrorSource::Force, &mut by_k);
         (c, found, by_k)
     }
 
@@ -387,7 +387,7 @@ impl Measurement<PlatformState> for PlatformMotion<'_> {
 }
 
 /// Extended filter of a plan, ready to run.
-pub struct Extended<'a> {
+pub struct ExtendedFilter<'a> {
     plan: &'a Plan,
     conditions: &'a Conditions,
     /// Matrix from psi in the axes of the unknowns to `psi^n`, and index of the psi, by position.
@@ -410,7 +410,7 @@ pub struct FilterResult {
     pub converged: bool,
 }
 
-impl<'a> Extended<'a> {
+impl<'a> ExtendedFilter<'a> {
     /// Extended filter of `plan`; `update` sets the iterations of a single update.
     ///
     /// # Errors
@@ -437,9 +437,10 @@ impl<'a> Extended<'a> {
         let gyros = plan.platform.scheme().geometry.gyros();
         let bias = |b: &Bias| match b.sensor {
             Sensor::Gyro(gyro) => ErrorTerm::bias(gyros[gyro].I),
-            Sensor::Accelerometer(axis) => {
-                ErrorTerm { source: Source::Force, ..ErrorTerm::bias(SignedAxis { axis, negative: false }) }
-            }
+            Sensor::Accelerometer(axis) => ErrorTerm {
+                source: ErrorSource::Force,
+                ..ErrorTerm::bias(SignedAxis { axis, negative: false })
+            },
         };
         let terms = plan.platform.error_terms().iter().cloned().chain(plan.biases.iter().map(bias)).collect();
         Ok(Self { plan, conditions, carried, terms, update })
@@ -478,7 +479,7 @@ impl<'a> Extended<'a> {
         let plan = self.plan;
         let outputs = plan.components.len();
         check_measurements(plan, z)?;
-        let mut filter = Filter::new(start.state(plan), &start.variances(), Form::Ud)?;
+        let mut filter = Filter::new(start.state(plan), &start.variances(), CovarianceForm::Ud)?;
         let mut there = Vec::with_capacity(outputs);
         let mut step = 0;
         for (segment, s) in plan.segments.iter().enumerate() {
@@ -573,7 +574,7 @@ mod tests {
         let mut rng = SplitMix64::new(3);
         for case in CASES {
             let (carry, (plan, conditions)) = (case.0, plan(case));
-            let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
+            let filter = ExtendedFilter::new(&plan, &conditions, Update::default()).expect("coefficients");
             let n = plan.states();
             for segment in 0..plan.segments.len() {
                 let motion = filter.motion(segment);
@@ -613,7 +614,7 @@ mod tests {
     fn at_zero_it_is_the_linear_model() {
         for case in CASES {
             let (carry, (plan, conditions)) = (case.0, plan(case));
-            let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
+            let filter = ExtendedFilter::new(&plan, &conditions, Update::default()).expect("coefficients");
             let n = plan.states();
             let zero = PlatformState::of_unknowns(&vec![0.0; n], plan.constants());
             for (segment, stage) in
@@ -640,7 +641,7 @@ mod tests {
         let mut rng = SplitMix64::new(5);
         for case in CASES {
             let (carry, (plan, conditions)) = (case.0, plan(case));
-            let filter = Extended::new(&plan, &conditions, Update::default()).expect("coefficients");
+            let filter = ExtendedFilter::new(&plan, &conditions, Update::default()).expect("coefficients");
             let start = random(&plan, &mut rng, 0.02, 6e-5);
             let mut truth = TruthModel::new(&plan, &conditions, start.clone());
             let mut x = PlatformState::of_unknowns(&start, plan.constants());

@@ -31,7 +31,7 @@
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Scheme, ranges};
 use obsdeg_ekf::linear::last_covariance;
-use obsdeg_ekf::{Form, SquareRootInformation};
+use obsdeg_ekf::{CovarianceForm, SquareRootInformation};
 use obsdeg_exact::parallel;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -186,7 +186,7 @@ pub fn sigmas_without_prior(
     }
     let mut sigma = wide_prior(&plan, &whole)?;
     sigma.extend(plan.bias_sigmas());
-    let prior = RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(Form::Ud)?;
+    let prior = RunStart { truth: Vec::new(), estimate: Vec::new(), sigma }.covariance(CovarianceForm::Ud)?;
     let mut last = last_covariance(&plan.stages, prior)?.sigmas();
     last.truncate(plan.unknowns());
     Ok(last)

@@ -12,12 +12,12 @@ use std::borrow::Cow;
 
 use obsdeg_ekf::consistency::Nees;
 use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
-use obsdeg_ekf::{Covariance, EkfError, Form, Manifold, Update};
+use obsdeg_ekf::{Covariance, CovarianceForm, EkfError, Manifold, Update};
 
 use super::conditions::Conditions;
 use super::curvature::SecondOrderTerms;
 use super::error::SimulationError;
-use super::extended::{Extended, FilterResult, check_measurements};
+use super::extended::{ExtendedFilter, FilterResult, check_measurements};
 use super::plan::Plan;
 use super::start::RunStart;
 use super::state::PlatformState;
@@ -48,7 +48,7 @@ struct Pass {
 
 /// One pass along the trajectory from `x0`, with the curvature `curvature`, over the steps of `z`.
 fn pass(
-    filter: &Extended<'_>,
+    filter: &ExtendedFilter<'_>,
     start: &RunStart,
     z: &[f64],
     x0: &PlatformState,
@@ -64,7 +64,7 @@ fn pass(
         p0 = c.prior(&p0);
         from.resize(p0.nrows(), 0.0);
     }
-    let prior = Covariance::new("P0", &p0, Form::Ud)?;
+    let prior = Covariance::new("P0", &p0, CovarianceForm::Ud)?;
     let mut ended = (x0.clone(), prior.clone());
     let mut delta = from.clone();
     let mut whitened = Vec::with_capacity(z.len());
@@ -100,7 +100,7 @@ fn pass(
 }
 
 /// Start of the trajectory that ends at `x`.
-fn back(filter: &Extended<'_>, mut x: PlatformState) -> Result<PlatformState, EkfError> {
+fn back(filter: &ExtendedFilter<'_>, mut x: PlatformState) -> Result<PlatformState, EkfError> {
     for (segment, s) in filter.plan().segments.iter().enumerate().rev() {
         let motion = filter.motion(segment);
         for i in (1..=s.steps).rev() {
@@ -129,7 +129,7 @@ impl IterationResult {
 
 /// Linearises along the trajectory from `x0` until the estimate at its end stays.
 fn settle(
-    filter: &Extended<'_>,
+    filter: &ExtendedFilter<'_>,
     start: &RunStart,
     z: &[f64],
     mut x0: PlatformState,
@@ -161,7 +161,11 @@ fn settle(
 
 /// Converges on the first eighth of the run, then from there on the first quarter, and so on: each trajectory
 /// starts close enough for twice the duration.
-fn settle_in_stages(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Result<IterationResult, EkfError> {
+fn settle_in_stages(
+    filter: &ExtendedFilter<'_>,
+    start: &RunStart,
+    z: &[f64],
+) -> Result<IterationResult, EkfError> {
     let outputs = filter.plan().components.len();
     let mut x0 = start.state(filter.plan());
     let mut passes = 0;
@@ -175,14 +179,14 @@ fn settle_in_stages(filter: &Extended<'_>, start: &RunStart, z: &[f64]) -> Resul
     Ok(IterationResult { passes: passes + settled.passes, ..settled })
 }
 
-/// Runs `filter` over the measurements `z` as [`Extended::run`] does, then again along the trajectory found,
+/// Runs `filter` over the measurements `z` as [`ExtendedFilter::run`] does, then again along the trajectory found,
 /// until it stays. If it does not converge, or fits poorly, longer and longer parts of the run are tried from
 /// the initial estimate too.
 ///
 /// # Errors
 /// [`EkfError`] for a number that is not finite, or if `z` belongs to another run.
 pub fn iterated(
-    filter: &Extended<'_>,
+    filter: &ExtendedFilter<'_>,
     start: &RunStart,
     z: &[f64],
     on_step: impl FnMut(usize, &PlatformState, &Covariance, &[f64]),
@@ -211,7 +215,7 @@ pub fn iterated(
 
 /// Curvature of the run about its most probable start `x0`, which becomes the mean of the likely starts.
 fn bent(
-    filter: &Extended<'_>,
+    filter: &ExtendedFilter<'_>,
     start: &RunStart,
     z: &[f64],
     x0: &mut PlatformState,
@@ -241,7 +245,7 @@ pub(crate) fn at_own_drifts(
         return Ok(None);
     }
     let start = RunStart::new(plan, conditions)?;
-    let filter = Extended::new(plan, conditions, Update::default())?;
+    let filter = ExtendedFilter::new(plan, conditions, Update::default())?;
     let mut x0 = PlatformState::of_unknowns(&start.truth, plan.constants());
     let at = Trajectory::new(&filter, x0.clone())?;
     let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::Propagation;
 use obsdeg_core::model::slew::{Slew, Turn, W_IE, apply, times, transpose};
 use obsdeg_core::model::{
-    AZIMUTH, Block, Carry, ErrorTerm, Float, LOCAL, Matrix3, Path, Platform, Point, Scheme, Source, Station,
-    Unknowns, earth_rate_in, local_dynamics, local_output,
+    AZIMUTH, Carry, ErrorSource, ErrorTerm, Float, LOCAL, Matrix3, Path, Platform, PlatformPoint,
+    PositionBlock, Scheme, Station, Unknowns, earth_rate_in, local_dynamics, local_output,
 };
 use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{Process, ProcessNoise, ScalarOutput, SensorNoise, Stage, Transition};
@@ -69,7 +69,7 @@ pub enum SegmentKind {
 
 /// Segment of the timeline.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Segment {
+pub struct PlanSegment {
     /// Index of the position in which the segment is spent, or to which the slew leads.
     pub position: usize,
     /// Kind: position, slew or rotation.
@@ -90,16 +90,16 @@ pub struct Plan {
     /// Platform of the scheme.
     pub platform: Platform,
     /// Rates and attitudes in numbers.
-    pub point: Point<Float>,
+    pub point: PlatformPoint<Float>,
     /// Attitude `C_c^n` at the start of every position.
     pub attitudes: Vec<Matrix3<f64>>,
     /// Attitude `C_c^n` at the end of every position.
     pub ends: Vec<Matrix3<f64>>,
     /// Map `S_i` at the start of every position. The contribution of torquer errors to psi^n in instantaneous
     /// turns belongs to the map, not to psi.
-    pub blocks: Vec<Block<f64>>,
+    pub blocks: Vec<PositionBlock<f64>>,
     /// Positions and slews in order of time.
-    pub segments: Vec<Segment>,
+    pub segments: Vec<PlanSegment>,
     /// Linear model of the filter, by segment.
     pub stages: Vec<Stage>,
     /// Random errors of the gyros X, Y, Z, in rad/s.
@@ -156,7 +156,8 @@ impl Plan {
         let attitudes: Vec<_> = bounds.iter().map(|b| point.attitudes[b.0]).collect();
         let ends: Vec<_> = bounds.iter().map(|b| point.attitudes[b.1]).collect();
         let segments = timeline(&scheme, conditions, n, &attitudes, &ends)?;
-        let mut blocks: Vec<Option<Block<f64>>> = platform.blocks(&point).into_iter().map(Some).collect();
+        let mut blocks: Vec<Option<PositionBlock<f64>>> =
+            platform.blocks(&point).into_iter().map(Some).collect();
         let blocks: Vec<_> = bounds.iter().filter_map(|b| blocks[b.0].take()).collect();
         let outputs = local_output(&Float, platform.observed());
         let components = outputs.iter().map(|(c, _)| *c).collect();
@@ -192,7 +193,7 @@ impl Plan {
     pub fn in_steps(
         mut self,
         conditions: &Conditions,
-        parts: impl Fn(&Segment) -> Vec<(usize, f64)>,
+        parts: impl Fn(&PlanSegment) -> Vec<(usize, f64)>,
     ) -> Result<Self, SimulationError> {
         let mut segments = Vec::new();
         for s in &self.segments {
@@ -202,7 +203,8 @@ impl Plan {
             }
             let mut t = 0.0;
             for (steps, dt) in parts(s) {
-                let part = |kind, t: f64, steps| Segment { kind, start_s: s.start_s + t, steps, dt, ..*s };
+                let part =
+                    |kind, t: f64, steps| PlanSegment { kind, start_s: s.start_s + t, steps, dt, ..*s };
                 match &s.kind {
                     // each step has a model of its own
                     SegmentKind::Rotation(whole) => segments.extend((0..steps).map(|i| {
@@ -344,7 +346,7 @@ impl Plan {
 
     /// Covariance of psi from the random drift of a step of a segment; that of a slew is the one of the steps
     /// of a position of the same duration.
-    fn psi_noise(&self, s: &Segment, conditions: &Conditions) -> Matrix3<f64> {
+    fn psi_noise(&self, s: &PlanSegment, conditions: &Conditions) -> Matrix3<f64> {
         let block = &self.blocks[s.position];
         match &s.kind {
             SegmentKind::Dwell | SegmentKind::Rotation(_) => {
@@ -379,7 +381,7 @@ impl Plan {
 
     /// Transition Phi of a dwell of `dt`: the exponential of the local dynamics, carried to the unknowns by
     /// `S_i`.
-    fn exponential(&self, block: &Block<f64>, dt: f64) -> DMatrix<f64> {
+    fn exponential(&self, block: &PositionBlock<f64>, dt: f64) -> DMatrix<f64> {
         let (turned, held) = earth_step(self.point.w_n, self.point.w_u, dt);
         let n = self.unknowns();
         let mut phi = DMatrix::identity(n, n);
@@ -400,7 +402,7 @@ impl Plan {
     }
 
     /// Covariance of psi from a drift of standard deviation `held` (rad/s) held over `dt`.
-    fn held_noise(&self, block: &Block<f64>, dt: f64, held: f64) -> Matrix3<f64> {
+    fn held_noise(&self, block: &PositionBlock<f64>, dt: f64, held: f64) -> Matrix3<f64> {
         let (_, b) = earth_step(self.point.w_n, self.point.w_u, dt);
         let p: Matrix3<f64> = std::array::from_fn(|r| std::array::from_fn(|k| block.rows[r][k]));
         let to_psi = times(&transpose(&p), &b);
@@ -434,11 +436,12 @@ fn earth_step(w_n: f64, w_u: f64, dt: f64) -> (Matrix3<f64>, Matrix3<f64>) {
 }
 
 /// Rates, attitudes and instantaneous turns of a scheme with a latitude and without generic angles.
-fn point_of(platform: &Platform, conditions: &Conditions) -> Point<Float> {
+fn point_of(platform: &Platform, conditions: &Conditions) -> PlatformPoint<Float> {
     let scheme = platform.scheme();
-    let (c, s) =
-        scheme.latitude.map_or((1.0, 0.0), |l| obsdeg_exact::Turn::from_nanodeg(l.nanodeg()).cos_sin_f64());
-    let mut point = Point::in_floats(platform, W_IE * c, W_IE * s);
+    let (c, s) = scheme
+        .latitude
+        .map_or((1.0, 0.0), |l| obsdeg_exact::TurnFraction::from_nanodeg(l.nanodeg()).cos_sin_f64());
+    let mut point = PlatformPoint::in_floats(platform, W_IE * c, W_IE * s);
     // turns of finite duration are integrated instead
     for (station, turns) in scheme.stations().iter().zip(&mut point.turns) {
         if conditions.slew_rate(station.position).is_some() {
@@ -480,7 +483,7 @@ fn slews(
 /// Timeline under construction, with the counts that are limited.
 #[derive(Default)]
 struct Timeline {
-    segments: Vec<Segment>,
+    segments: Vec<PlanSegment>,
     /// End of the last segment, in s.
     end_s: f64,
     /// Numbers of steps, of steps of rotating segments, and of integration steps.
@@ -493,7 +496,7 @@ impl Timeline {
     /// Adds a segment of `steps` equal steps.
     fn push(&mut self, position: usize, kind: SegmentKind, duration: f64, steps: usize, left_out: bool) {
         let dt = duration / steps as f64;
-        self.segments.push(Segment { position, kind, start_s: self.end_s, steps, dt, left_out });
+        self.segments.push(PlanSegment { position, kind, start_s: self.end_s, steps, dt, left_out });
         self.end_s += duration;
     }
 
@@ -559,7 +562,7 @@ fn timeline(
     unknowns: usize,
     attitudes: &[Matrix3<f64>],
     ends: &[Matrix3<f64>],
-) -> Result<Vec<Segment>, SimulationError> {
+) -> Result<Vec<PlanSegment>, SimulationError> {
     let mut out = Timeline::default();
     for (position, p) in scheme.positions.iter().enumerate() {
         if let (Some(rate), true) = (conditions.slew_rate(p), position > 0) {
@@ -679,9 +682,9 @@ impl Plan {
         let fastest = (0..self.segments.len()).filter_map(|i| self.turns(i)).map(|s| s.turned(1.0));
         let fastest = fastest.fold(W_IE, f64::max);
         let of = |(term, d): (&ErrorTerm, &f64)| match term.source {
-            Source::Gravity => d.abs(),
-            Source::Rate => d.abs() * fastest,
-            Source::Force => 0.0,
+            ErrorSource::Gravity => d.abs(),
+            ErrorSource::Rate => d.abs() * fastest,
+            ErrorSource::Force => 0.0,
         };
         self.platform.error_terms().iter().zip(coefficients).map(of).sum()
     }

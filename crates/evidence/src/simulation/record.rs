@@ -2,12 +2,12 @@
 
 use obsdeg_core::model::settings::{FilterKind, Truth};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
-use obsdeg_ekf::{Covariance, Form, Manifold, Update};
+use obsdeg_ekf::{Covariance, CovarianceForm, Manifold, Update};
 
 use super::answer::{FilterReason, FilterReport};
 use super::conditions::{Conditions, shown_unit, si_per_shown};
 use super::error::SimulationError;
-use super::extended::{Extended, FilterResult};
+use super::extended::{ExtendedFilter, FilterResult};
 use super::iterated::{MAX_ITERATED_STEPS, iterated};
 use super::noise::Noise;
 use super::plan::Plan;
@@ -53,7 +53,7 @@ pub struct Traces {
 
 /// Run, sample by sample.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Record {
+pub struct RunRecord {
     /// Truth, estimate and sigma of all quantities.
     pub traces: Traces,
     /// Whitened innovations, one per output and sampled step.
@@ -200,7 +200,7 @@ fn linear(
     sampled: &SampledTruth,
     recorded: &RecordedQuantities<'_>,
 ) -> Result<FilterSeries, SimulationError> {
-    let prior = start.covariance(Form::Ud)?;
+    let prior = start.covariance(CovarianceForm::Ud)?;
     let mut sigma = vec![Vec::new(); recorded.len()];
     let mut push = |p: &Covariance| {
         let now = recorded.sigmas(p, |_, _| None);
@@ -239,7 +239,7 @@ fn extended(
     recorded: &RecordedQuantities<'_>,
     again: bool,
 ) -> Result<FilterSeries, SimulationError> {
-    let filter = Extended::new(plan, conditions, Update::default())?;
+    let filter = ExtendedFilter::new(plan, conditions, Update::default())?;
     let (mut estimate, mut sigma) = (vec![Vec::new(); recorded.len()], vec![Vec::new(); recorded.len()]);
     let mut push = |state: &PlatformState, p: &Covariance| {
         let x = state.unknowns();
@@ -249,7 +249,7 @@ fn extended(
         let local = |i: usize, c: &[(usize, f64)]| (i < psi || c.len() > 1).then(|| state.functional(c));
         sigma.iter_mut().zip(recorded.sigmas(p, local)).for_each(|(s, now)| s.push(now));
     };
-    push(&start.state(plan), &start.covariance(Form::Ud)?);
+    push(&start.state(plan), &start.covariance(CovarianceForm::Ud)?);
     let mut whitened = Vec::new();
     let on_step = |_: usize, x: &PlatformState, p: &Covariance, innovations: &[f64]| {
         push(x, p);
@@ -318,7 +318,7 @@ pub fn run(
     start: &RunStart,
     prediction: &Prediction,
     seed: u64,
-) -> Result<Record, SimulationError> {
+) -> Result<RunRecord, SimulationError> {
     let n = plan.unknowns();
     let recorded = RecordedQuantities {
         unknowns: n,
@@ -343,7 +343,7 @@ pub fn run(
         traces.linear = Some(series(linear(plan, start, &sampled, &recorded)?));
     }
     let (passes, converged) = filtered.passes;
-    Ok(Record {
+    Ok(RunRecord {
         whitened: filtered.whitened.clone(),
         last_covariance: filtered.covariance.clone(),
         last_error: filtered.error.clone(),

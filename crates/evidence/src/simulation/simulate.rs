@@ -15,12 +15,12 @@ use super::consistency::{Consistency, Outcomes};
 use super::error::SimulationError;
 use super::floor::noise_floor;
 use super::plan::Plan;
-use super::record::{Record, run};
+use super::record::{RunRecord, run};
 use super::reports::{conditions_report, timeline_report};
 use super::seen::predict_run;
 use super::start::RunStart;
 use crate::prediction::{PredictedCombination, Prediction};
-use crate::requirements::{Basis, Claim, Miss, Requirements, meets};
+use crate::requirements::{Basis, Miss, RequirementClaim, Requirements, meets};
 use crate::simulation::omitted::omitted_effects;
 
 /// Simulates one run of `scheme`: the summary and the time series.
@@ -31,7 +31,7 @@ pub fn simulate(
     scheme: &Scheme,
     conditions: &Conditions,
     seed: u64,
-) -> Result<(Simulation, Record), SimulationError> {
+) -> Result<(Simulation, RunRecord), SimulationError> {
     let plan = Plan::new(scheme, conditions)?;
     let start = RunStart::new(&plan, conditions)?;
     let prediction = predict_run(&plan, &start.sigma[..plan.unknowns()], seed)?;
@@ -44,7 +44,7 @@ pub fn simulate(
 fn summary(
     (scheme, plan, conditions): (&Scheme, &Plan, &Conditions),
     prediction: &Prediction,
-    record: &Record,
+    record: &RunRecord,
     bench: &DMatrix<f64>,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
@@ -88,7 +88,7 @@ fn summary(
 struct RunEstimates<'a> {
     plan: &'a Plan,
     prediction: &'a Prediction,
-    record: &'a Record,
+    record: &'a RunRecord,
     /// Contributions of a bench.
     bench: &'a DMatrix<f64>,
     /// Required sigma by unknown; NaN where none is stated.
@@ -143,7 +143,7 @@ fn run_requirements(
     (plan, bench): (&Plan, &DMatrix<f64>),
     conditions: &Conditions,
     quantities: &[Estimate],
-    record: &Record,
+    record: &RunRecord,
 ) -> Result<RunRequirements, SimulationError> {
     let units = plan.platform.units();
     let claims = quantities.iter().enumerate().map(|(c, q)| {
@@ -155,7 +155,7 @@ fn run_requirements(
             Some(why) => Err(why),
             None => Ok(total),
         };
-        Claim { name: &q.name, required: q.required_sigma, sigma }
+        RequirementClaim { name: &q.name, required: q.required_sigma, sigma }
     });
     let mut requirements = Requirements::of(Basis::Run, claims);
     requirements.with_bench = bench.ncols() > 0;
@@ -185,7 +185,7 @@ fn estimate(
     name: &str,
     unit: &str,
     verdict: (Status, Option<usize>, Option<usize>, bool),
-    (i, record): (usize, &Record),
+    (i, record): (usize, &RunRecord),
     [required_sigma, predicted_sigma]: [Option<f64>; 2],
     bench: f64,
 ) -> Estimate {

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::Truth;
-use obsdeg_ekf::{Covariance, Form};
+use obsdeg_ekf::{Covariance, CovarianceForm};
 
 use super::conditions::{Conditions, ESTIMATE, PRIOR, TRUE_VALUE, is_rate, resolve, si_per_shown};
 use super::error::SimulationError;
@@ -52,7 +52,7 @@ impl RunStart {
     ///
     /// # Errors
     /// [`SimulationError::Filter`].
-    pub fn covariance(&self, form: Form) -> Result<Covariance, SimulationError> {
+    pub fn covariance(&self, form: CovarianceForm) -> Result<Covariance, SimulationError> {
         Ok(Covariance::new("P0", &self.variances(), form)?)
     }
 

@@ -3,7 +3,7 @@
 use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage};
 use obsdeg_exact::interrupt;
 
-use super::extended::{Extended, PlatformMotion};
+use super::extended::{ExtendedFilter, PlatformMotion};
 use super::state::PlatformState;
 
 /// Run without noise.
@@ -18,7 +18,7 @@ impl Trajectory {
     /// Moves from `x` through at most `most` steps. `on_step` gets the segment, the time within it, the
     /// length of the step, and the state, which it moves.
     fn through(
-        filter: &Extended<'_>,
+        filter: &ExtendedFilter<'_>,
         most: usize,
         mut x: PlatformState,
         mut on_step: impl FnMut(&PlatformMotion<'_>, f64, f64, &mut PlatformState) -> Result<(), EkfError>,
@@ -37,7 +37,7 @@ impl Trajectory {
     }
 
     /// Noise-free run from `x`.
-    pub(super) fn new(filter: &Extended<'_>, x: PlatformState) -> Result<Self, EkfError> {
+    pub(super) fn new(filter: &ExtendedFilter<'_>, x: PlatformState) -> Result<Self, EkfError> {
         Self::through(filter, usize::MAX, x, |motion, t, dt, x| motion.carry(t, dt, x))
     }
 }
@@ -52,7 +52,7 @@ pub(super) struct LinearisedRun {
 
 impl LinearisedRun {
     /// Linearisation along the trajectory from `x`, of at most `most` steps.
-    pub(super) fn new(filter: &Extended<'_>, most: usize, x: PlatformState) -> Result<Self, EkfError> {
+    pub(super) fn new(filter: &ExtendedFilter<'_>, most: usize, x: PlatformState) -> Result<Self, EkfError> {
         let mut stages = Vec::new();
         let at = Trajectory::through(filter, most, x, |motion, t, dt, x| {
             let (transition, noise) = motion.advance(t, dt, x)?;

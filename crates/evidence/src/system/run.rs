@@ -7,7 +7,7 @@ use obsdeg_core::system::{
     Compiled, DigitsReport, Judgement, ModelError, StateStart, SystemModel, judge_compiled,
 };
 use obsdeg_ekf::integrate::runge_kutta;
-use obsdeg_ekf::{EkfError, Filter, Form, Measurement};
+use obsdeg_ekf::{CovarianceForm, EkfError, Filter, Measurement};
 use obsdeg_exact::interrupt;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -410,7 +410,7 @@ impl<'a> FilterRun<'a> {
         let mut noise = Noise::new(seed, 0);
         let (error, p0) = initial_error(numeric, truth, prior, &mut noise);
         let estimate = truth + error;
-        let filter = Filter::new(estimate, &p0, Form::Ud).map_err(stopped(0.0, *duration))?;
+        let filter = Filter::new(estimate, &p0, CovarianceForm::Ud).map_err(stopped(0.0, *duration))?;
         let traces = Traces {
             names: numeric.names.clone(),
             units: numeric.states.iter().map(|s| unit(model, s)).collect(),
@@ -459,7 +459,8 @@ impl<'a> FilterRun<'a> {
             let p = &phi * self.filter.covariance().matrix() * phi.transpose();
             let floor = prior.iter().map(|s| (KNOWN * s).powi(2));
             let floor = DMatrix::from_diagonal(&DVector::from_iterator(prior.len(), floor));
-            self.filter = Filter::new(x, &(p + floor), Form::Ud).map_err(stopped(begin, *duration))?;
+            self.filter =
+                Filter::new(x, &(p + floor), CovarianceForm::Ud).map_err(stopped(begin, *duration))?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use obsdeg_core::model::{Angle, Carry, Dwell, Geometry, PathStep, Scheme, Source, Term, Unknowns};
+use obsdeg_core::model::{Angle, Carry, Dwell, ErrorSource, Geometry, PathStep, Scheme, Term, Unknowns};
 use obsdeg_exact::SplitMix64;
 
 use super::digits::{Constants, Digits, ROUNDING, Real, Vector, log2};
@@ -91,7 +91,7 @@ fn acting(
     d: Digits,
     geometry: &Geometry,
     terms: &[Term],
-    source: Source,
+    source: ErrorSource,
     x: &[Real],
 ) -> Vec<([i32; 3], Real)> {
     let gyros = [&geometry.X, &geometry.Y, &geometry.Z];
@@ -100,7 +100,7 @@ fn acting(
     let of_accelerometers = [a.X.vector(), a.Y.vector(), a.Z.vector()];
     let mut out = Vec::new();
     for &term in terms {
-        let inputs = if term.source() == Source::Force { of_accelerometers } else { of_gyros };
+        let inputs = if term.source() == ErrorSource::Force { of_accelerometers } else { of_gyros };
         for i in 0..3 {
             let own = along(d, x, inputs[i]);
             let square = d.mul(&own, &own);
@@ -229,7 +229,7 @@ fn torqued(
             let angle = d.mul(&half_turns, &constants.pi(d.bits));
             // E(u) in c, then turned on
             let unit = identity(d);
-            let act = in_n(d, &unit, &acting(d, geometry, terms, Source::Rate, &u));
+            let act = in_n(d, &unit, &acting(d, geometry, terms, ErrorSource::Rate, &u));
             let [_, left] = turned(d, &u, &angle, &act);
             let to_n = |c: &[Vector; 3], m: &[Vector; 3]| -> [Vector; 3] {
                 std::array::from_fn(|r| {
@@ -257,7 +257,7 @@ fn outputs(scheme: &Scheme) -> Vec<PreciseOutput> {
     let z =
         |psi: Option<(usize, bool)>, error: usize| PreciseOutput { psi, error: Some(error), azimuth: false };
     let mut out = vec![z(Some((2, false)), 0), z(Some((0, true)), 2)];
-    if scheme.unknowns.have(Source::Force) {
+    if scheme.unknowns.have(ErrorSource::Force) {
         out.push(z(None, 1));
     }
     if scheme.measured_azimuth {
@@ -290,8 +290,8 @@ impl Model {
             Unknowns::Coefficients(_) => attitudes
                 .iter()
                 .map(|c| {
-                    let gravity = in_n(d, c, &of(c, Source::Gravity, down()));
-                    plus(d, &gravity, &in_n(d, c, &of(c, Source::Rate, earth())))
+                    let gravity = in_n(d, c, &of(c, ErrorSource::Gravity, down()));
+                    plus(d, &gravity, &in_n(d, c, &of(c, ErrorSource::Rate, earth())))
                 })
                 .collect(),
             // the total drift in n is an unknown itself
@@ -300,11 +300,11 @@ impl Model {
         let none: [Vector; 3] = std::array::from_fn(|r| drifts[0][r].iter().map(|_| zero()).collect());
         let errors = match &scheme.unknowns {
             Unknowns::Coefficients(_) => {
-                attitudes.iter().map(|c| in_n(d, c, &of(c, Source::Force, up()))).collect()
+                attitudes.iter().map(|c| in_n(d, c, &of(c, ErrorSource::Force, up()))).collect()
             }
             Unknowns::Drift => vec![none.clone(); attitudes.len()],
         };
-        let torqued = match scheme.unknowns.have(Source::Rate) {
+        let torqued = match scheme.unknowns.have(ErrorSource::Rate) {
             true => torqued(d, scheme, terms, &attitudes, &none, &mut constants)?,
             false => vec![none; attitudes.len()],
         };

@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use obsdeg_core::model::slew::{Slew, apply, rotation, rotation_vector, times, transpose};
 use obsdeg_core::model::{
     AZIMUTH, Carry, Columns, Float, LOCAL, Matrix3, OmittedEffect, OmittedModel, OmittedTerm, Platform,
-    Point, local_dynamics,
+    PlatformPoint, local_dynamics,
 };
 use obsdeg_ekf::integrate::van_loan;
 
@@ -26,7 +26,7 @@ pub struct OmittedColumns<'a> {
     plan: &'a Plan,
     model: &'a OmittedModel,
     /// Values for instantaneous turns on which torquer errors act.
-    turning: Option<Point<Float>>,
+    turning: Option<PlatformPoint<Float>>,
     /// Tilts of the platform, step by step; empty for a platform in the attitude of the scheme.
     tilts: Vec<Tilt>,
     /// Number of finished steps, over all segments.
@@ -74,7 +74,7 @@ impl<'a> OmittedColumns<'a> {
         Self {
             plan,
             model,
-            turning: turning.map(|p| Point::in_floats(&p, w_n, w_u)),
+            turning: turning.map(|p| PlatformPoint::in_floats(&p, w_n, w_u)),
             tilts,
             done: 0,
             segment: 0,

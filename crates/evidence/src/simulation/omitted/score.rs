@@ -40,7 +40,7 @@ pub struct Score {
 
 /// Error, or pair of errors, that explains the residuals.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Explanation {
+pub struct ResidualExplanation {
     /// Indices of one or two errors.
     pub errors: Vec<usize>,
     /// Estimate and standard deviation of each error, in SI units.
@@ -185,7 +185,7 @@ impl Score {
 
     /// Best explanation of the residuals: a single error, or a pair if no single one explains them; `None` if
     /// chance suffices. `level` is the probability of an explanation where nothing is wrong.
-    pub fn explanation(&self, level: f64) -> Option<Explanation> {
+    pub fn explanation(&self, level: f64) -> Option<ResidualExplanation> {
         let tried = self.tried();
         let best = tried.iter().copied().max_by(|&i, &j| self.fall(i).total_cmp(&self.fall(j)))?;
         let fall = self.fall(best);
@@ -193,7 +193,7 @@ impl Score {
         let probability = (chi_square_tail(1.0, counted) * tried.len() as f64).min(1.0);
         let own = self.products[(best, best)];
         let explained = self.explained(fall, 1.0);
-        let single = Explanation {
+        let single = ResidualExplanation {
             errors: vec![best],
             estimates: vec![[self.against[best] / own, 1.0 / own.sqrt()]],
             fall,
@@ -207,7 +207,7 @@ impl Score {
     }
 
     /// The best pair, if it explains more than the best single error by more than chance.
-    fn best_pair(&self, tried: &[usize], single: f64, level: f64) -> Option<Explanation> {
+    fn best_pair(&self, tried: &[usize], single: f64, level: f64) -> Option<ResidualExplanation> {
         let pairs = tried.iter().enumerate().flat_map(|(k, &i)| tried[..k].iter().map(move |&j| [i, j]));
         let found = pairs.filter_map(|p| self.pair(p).map(|(estimates, fall)| (p, estimates, fall)));
         let (mut errors, mut estimates, fall) = found.max_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -225,7 +225,7 @@ impl Score {
         }
         let [a, b] = errors;
         let found = (fall, left_over);
-        Some(Explanation {
+        Some(ResidualExplanation {
             errors: errors.into(),
             estimates: estimates.into(),
             fall,

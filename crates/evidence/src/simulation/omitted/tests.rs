@@ -5,7 +5,7 @@ use obsdeg_core::model::{Angle, Carry, OmittedModel, Platform, Scheme, cardinal,
 use obsdeg_core::omitted::{OmittedClass, omitted_verdicts};
 use obsdeg_ekf::consistency::chi_square_tail;
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
-use obsdeg_ekf::{Covariance, Form, Gains};
+use obsdeg_ekf::{Covariance, CovarianceForm, Gains};
 use obsdeg_exact::SplitMix64;
 
 use super::{FamilyEffect, OmittedColumns, OmittedEffects, Score, omitted_effects};
@@ -590,7 +590,8 @@ impl Records {
         let plan = Plan::new(scheme, &conditions).expect("a plan");
         let prior = no_prior(&plan).expect("a prior");
         let variances = DVector::from_iterator(prior.len(), prior.iter().map(|s| (1e-3 * s).powi(2)));
-        let p0 = Covariance::new("P0", &DMatrix::from_diagonal(&variances), Form::Ud).expect("a prior");
+        let p0 =
+            Covariance::new("P0", &DMatrix::from_diagonal(&variances), CovarianceForm::Ud).expect("a prior");
         let gains = covariance_pass(&plan.stages, p0, |_, _| {}).expect("gains");
         let model = OmittedModel::new(&plan.platform);
         let m = model.terms().len();
