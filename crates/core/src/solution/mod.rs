@@ -24,4 +24,4 @@ pub use print::{Group, Grouped, SolutionTerm, StationLabel, group};
 pub use requested::CombinationError;
 pub use solve::{FoundBy, Solved, Verification};
 pub use solver::{Frame, Functional, Solver, Sparse};
-pub use term::SolutionTerm;
+pub use term::DerivativeTerm;

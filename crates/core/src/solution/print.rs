@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::solve::Solved;
 use super::solver::Frame;
-use super::term::SolutionTerm;
+use super::term::DerivativeTerm;
 use crate::degree::coefficient::{Coefficient, product};
 use crate::model::Scheme;
 
@@ -72,7 +72,7 @@ pub struct Group {
     /// Power of the turning rate, common to all terms.
     pub turns: usize,
     /// Terms, each with true for a minus sign inside the group.
-    pub terms: Vec<(bool, SolutionTerm)>,
+    pub terms: Vec<(bool, DerivativeTerm)>,
 }
 
 /// Groups the terms of a solution.
@@ -133,7 +133,7 @@ fn rate_power(rate: &str, turns: usize) -> String {
 }
 
 /// Observation of a term, as in `Z1''`.
-fn observed(term: &SolutionTerm, frame: Frame) -> String {
+fn observed(term: &DerivativeTerm, frame: Frame) -> String {
     let base = match (frame, term.azimuth) {
         (_, true) => "Za".to_string(),
         (Frame::N, _) => format!("Z{}", term.component),
@@ -143,7 +143,7 @@ fn observed(term: &SolutionTerm, frame: Frame) -> String {
 }
 
 /// Name of a derivative of Z, as in `Z1''@p2`.
-pub(crate) fn z_name(term: &SolutionTerm, frame: Frame, stations: &[StationLabel]) -> String {
+pub(crate) fn z_name(term: &DerivativeTerm, frame: Frame, stations: &[StationLabel]) -> String {
     format!("{}@{}", observed(term, frame), stations[term.station].label)
 }
 
@@ -160,7 +160,7 @@ pub struct SolutionTerm {
 
 /// Terms of a solution, one by one.
 pub(crate) fn terms(solved: &Solved, frame: Frame, stations: &[StationLabel]) -> Vec<SolutionTerm> {
-    let term = |t: &SolutionTerm| {
+    let term = |t: &DerivativeTerm| {
         let (negative, mut factors) = t.coefficient.precise_sign_and_factors();
         let station = &stations[t.station];
         factors.extend(station.rate.as_deref().filter(|_| t.turns > 0).map(|rate| rate_power(rate, t.turns)));
@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn the_form_of_the_method() {
-        let term = |station, component, order, num, rates| SolutionTerm {
+        let term = |station, component, order, num, rates| DerivativeTerm {
             station,
             component,
             azimuth: false,

@@ -10,7 +10,7 @@ use super::problem::{LinearSystem, TurningCorrection};
 use super::solver::{Frame, Functional, MAX_SYMBOLIC_ANGLES, PRINTABLE, Solver, float_point, tidy};
 use super::substitution::{Substitution, binomial};
 use super::support::short_support;
-use super::term::SolutionTerm;
+use super::term::DerivativeTerm;
 use super::turning::attitude_derivative;
 use crate::degree::coefficient::{Coefficient, Form, Number, READABLE, Rates, power, readable};
 use crate::model::platform::{AZIMUTH, PlatformPoint};
@@ -51,7 +51,7 @@ pub enum Verification {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solved {
     /// Terms, sorted by power of the turning rate, order, component and station.
-    pub terms: Vec<SolutionTerm>,
+    pub terms: Vec<DerivativeTerm>,
     /// Source of the coefficients.
     pub found_by: FoundBy,
     /// Check that the solution passed.
@@ -143,7 +143,7 @@ impl Solver<'_> {
     /// True if the terms, as printed, sum up to `targets` (one row per table) when every derivative of Z is
     /// replaced by its row, at rest or turning, in all tables; terms with decimals are summed in floating
     /// point.
-    fn holds(&self, terms: &[SolutionTerm], functional: &Functional, targets: &[Vec<u64>]) -> bool {
+    fn holds(&self, terms: &[DerivativeTerm], functional: &Functional, targets: &[Vec<u64>]) -> bool {
         if terms.iter().any(|t| matches!(t.coefficient.number, Number::Decimal(_))) {
             return self.holds_in_floats(terms, functional).unwrap_or(false);
         }
@@ -151,7 +151,7 @@ impl Solver<'_> {
             let f = table.sample.roots.field;
             // every position has its own turning rate
             let turning = |i: usize| f.from_u64(SplitMix64::new(f.modulus() ^ i as u64).next_u64());
-            let coefficient = |t: &SolutionTerm| {
+            let coefficient = |t: &DerivativeTerm| {
                 let image = self.image(&t.coefficient, field, table)?;
                 Some(f.mul(image, f.pow(turning(self.stations[t.station].0), t.turns as u64)))
             };
@@ -163,11 +163,11 @@ impl Solver<'_> {
 
     /// True if the terms sum up to the functional in floating point at other rates; `None` for generic
     /// angles.
-    fn holds_in_floats(&self, terms: &[SolutionTerm], functional: &Functional) -> Option<bool> {
+    fn holds_in_floats(&self, terms: &[DerivativeTerm], functional: &Functional) -> Option<bool> {
         let (w_n, w_u, turning) = OTHER_RATES;
         let point = float_point(self.platform, &self.tables, (w_n, w_u));
         let number = |c: &Coefficient| Some(self.number(c)? * w_n.powi(c.rates[0]) * w_u.powi(c.rates[1]));
-        let coefficient = |t: &SolutionTerm| Some(number(&t.coefficient)? * turning.powi(t.turns as i32));
+        let coefficient = |t: &DerivativeTerm| Some(number(&t.coefficient)? * turning.powi(t.turns as i32));
         let coefficients: Vec<f64> = terms.iter().map(coefficient).collect::<Option<_>>()?;
         let mut rest =
             Substitution::new(self.platform, &point, self.frame).sum(terms, &coefficients, |_| turning);
@@ -187,10 +187,10 @@ impl Solver<'_> {
         let system = self.row_system(&targets, degree)?;
         let plan = self.plan(&system.used);
         let (numbers, found_by, verification) = self.numbers(functional, &system, &plan)?;
-        let mut terms: Vec<SolutionTerm> = plan
+        let mut terms: Vec<DerivativeTerm> = plan
             .iter()
             .zip(numbers)
-            .map(|((key, _), number)| SolutionTerm {
+            .map(|((key, _), number)| DerivativeTerm {
                 station: key.station,
                 component: key.component,
                 azimuth: key.azimuth,

@@ -1,7 +1,7 @@
 //! Substitution of the derivatives of Z in printed terms: their sum as a functional of the unknowns.
 
 use super::solver::Frame;
-use super::term::SolutionTerm;
+use super::term::DerivativeTerm;
 use super::turning::{attitude_derivative, drift_derivative};
 use crate::model::Platform;
 use crate::model::attitude::Matrix3;
@@ -55,7 +55,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
     /// of turning; `turning` is the turning rate at a position.
     pub(super) fn sum(
         &self,
-        terms: &[SolutionTerm],
+        terms: &[DerivativeTerm],
         coefficients: &[R::Element],
         turning: impl Fn(usize) -> R::Element,
     ) -> Vec<R::Element> {
@@ -83,7 +83,7 @@ impl<'a, R: Ring> Substitution<'a, R> {
     }
 
     /// Derivative of Z that a term names, as a functional of the local unknowns and `eps^n'`.
-    fn derivative(&self, term: &SolutionTerm, rate: &R::Element) -> [R::Element; MOVING] {
+    fn derivative(&self, term: &DerivativeTerm, rate: &R::Element) -> [R::Element; MOVING] {
         let ring = &self.point.ring;
         // Z^n^(k) as measured
         let in_n = |component: usize, order: usize| {

@@ -5,7 +5,7 @@ use crate::degree::coefficient::Coefficient;
 /// Term `coefficient * w^turns * Z_component^(order) @ station`, with the turning rate w of the platform at
 /// the station.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SolutionTerm {
+pub struct DerivativeTerm {
     /// Index of the station.
     pub station: usize,
     /// Component 1, 2, 3 in n or platform axes, or the number of a measured azimuth.

@@ -1,7 +1,7 @@
 //! Formulas as LaTeX: names, expressions in program notation, solutions.
 
 use obsdeg_core::analysis::Solution;
-use obsdeg_core::solution::{Frame, Group, SolutionTerm, StationLabel, group};
+use obsdeg_core::solution::{DerivativeTerm, Frame, Group, StationLabel, group};
 
 use super::escape;
 
@@ -344,7 +344,7 @@ fn plain(math: &str) -> bool {
 }
 
 /// Output derivative at a station: `Z_3''@p1`.
-fn z(term: &SolutionTerm, frame: Frame, stations: &[StationLabel]) -> String {
+fn z(term: &DerivativeTerm, frame: Frame, stations: &[StationLabel]) -> String {
     let letter = match term.order {
         0 => "Z".to_string(),
         1 => "\\dot{Z}".into(),
