@@ -97,8 +97,8 @@ pub(super) struct SampleAssignment<'a> {
 }
 
 impl<'a> SampleAssignment<'a> {
-    /// State before the first row of a record. Bins are at most `bin_s` long; `sigmas` are approximate ones of
-    /// a sample, by channel.
+    /// State before the first row of a record. Bins are at most `bin_s` long; `sigmas` are approximate ones
+    /// of a sample, by channel.
     pub(super) fn new(
         record: &Record,
         layout: &'a RecordColumns,

@@ -134,8 +134,8 @@ impl<'a> Window<'a> {
         Self { t, values, weights, sorted, steps, s, far }
     }
 
-    /// True for each row of an output that gets stuck: it holds a value that fits the row before, which a code
-    /// does not.
+    /// True for each row of an output that gets stuck: it holds a value that fits the row before, which a
+    /// code does not.
     fn gets_stuck(&self) -> Vec<bool> {
         let values = self.values;
         let mut out = vec![false; values.len()];

@@ -90,8 +90,8 @@ fn is_increment(unit: &str) -> bool {
     INCREMENTS.iter().any(|(u, _)| *u == unit)
 }
 
-/// Requested numbers of three columns `names`, each in one of `units`; `instead` where the record has none and
-/// none is `needed`, as Z2 of a scheme without unknown accelerometers.
+/// Requested numbers of three columns `names`, each in one of `units`; `instead` where the record has none
+/// and none is `needed`, as Z2 of a scheme without unknown accelerometers.
 fn three_wanted(
     record: &Record,
     names: &[String; 3],

@@ -144,8 +144,8 @@ fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
     out
 }
 
-/// Lengths of the intervals in which the rows leave open when each position begins, in s. Ends of `stays` move
-/// to their middles.
+/// Lengths of the intervals in which the rows leave open when each position begins, in s. Ends of `stays`
+/// move to their middles.
 fn open_ends(reading: &Reading, stays: &mut [(f64, f64)], slews: &[f64]) -> Vec<f64> {
     let mut open = vec![0.0; reading.bins.len()];
     if reading.ends_open {
@@ -355,7 +355,8 @@ struct RunLinearisation<'a> {
     residuals: Vec<f64>,
     keys: Vec<MeasurementKey>,
     second: Option<SecondDerivatives>,
-    /// Changes of position that follow, and the drift (1/s) before the next, carried to the trajectory's time.
+    /// Changes of position that follow, and the drift (1/s) before the next, carried to the trajectory's
+    /// time.
     changes: Peekable<std::slice::Iter<'a, PositionChange>>,
     drift: Vec<f64>,
     scratch: Vec<f64>,
@@ -423,8 +424,8 @@ impl<'a> RunLinearisation<'a> {
         Ok(outputs)
     }
 
-    /// Noise of a segment with its root. A change of position that is later by some time adds the drift before
-    /// it, carried through the slew, and takes away that behind it.
+    /// Noise of a segment with its root. A change of position that is later by some time adds the drift
+    /// before it, carried through the slew, and takes away that behind it.
     fn noise(
         &mut self,
         segment: usize,

@@ -324,7 +324,8 @@ impl<'a> Calibrating<'a> {
         }
     }
 
-    /// Solution with more integration steps, until it does not change visibly, and the factor of their number.
+    /// Solution with more integration steps, until it does not change visibly, and the factor of their
+    /// number.
     fn with_finer_steps(
         &mut self,
         mut best: Settled,

@@ -440,8 +440,8 @@ fn control_changes(scheme: &Scheme, truth: &Plan) -> Vec<(FilterChange, f64)> {
     changes.into_iter().flatten().collect()
 }
 
-/// Control by a wrong filter, of whose checks `failed` out of `checks` fail; `None` without a statistic of its
-/// innovations.
+/// Control by a wrong filter, of whose checks `failed` out of `checks` fail; `None` without a statistic of
+/// its innovations.
 fn control(
     name: String,
     off_deg: f64,

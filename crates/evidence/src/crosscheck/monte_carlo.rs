@@ -342,8 +342,8 @@ impl<'a> PreparedExperiment<'a> {
         }
     }
 
-    /// NEES of the observable subspace for the estimate `x` at the end, where the true states are `truth`; zero
-    /// without such a subspace.
+    /// NEES of the observable subspace for the estimate `x` at the end, where the true states are `truth`;
+    /// zero without such a subspace.
     fn nees_observable(&self, x: &[f64], truth: &[f64]) -> f64 {
         let Some((basis, nees)) = &self.observable else { return 0.0 };
         // a truth without biases has zeros in their place

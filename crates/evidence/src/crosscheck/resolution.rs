@@ -7,7 +7,7 @@ use obsdeg_core::model::slew::W_IE;
 use obsdeg_exact::SplitMix64;
 
 use super::asymptotics::functional;
-use super::precise::{Digits, Functional, Model, Posterior, SampleInformation};
+use super::precise::{Digits, Functional, Posterior, PreciseModel, SampleInformation};
 use crate::prediction::Combination;
 use crate::simulation::conditions::is_rate;
 use crate::simulation::{Conditions, Plan};
@@ -47,7 +47,7 @@ pub(super) struct Resolution<'a> {
     /// Standard deviations of the prior, in SI units.
     prior: &'a [f64],
     /// Model in high precision; `None` where it cannot be computed, here and below.
-    model: OnceCell<Option<Model>>,
+    model: OnceCell<Option<PreciseModel>>,
     /// Filter of the model.
     exact: OnceCell<Option<PosteriorPair>>,
     /// Filters of the model with randomly rounded numbers.
@@ -71,16 +71,16 @@ impl<'a> Resolution<'a> {
         !is_rate(self.plan.platform.units()[c])
     }
 
-    fn model(&self) -> Option<&Model> {
+    fn model(&self) -> Option<&PreciseModel> {
         let compute = || {
             let scheme = self.plan.platform.scheme().with_dwells(self.conditions.dwell_s, 1.0).ok()?;
-            Model::new(&scheme, Digits { bits: BITS })
+            PreciseModel::new(&scheme, Digits { bits: BITS })
         };
         self.model.get_or_init(compute).as_ref()
     }
 
     /// Filter of a model, at the times of its samples.
-    fn filtered(&self, model: &Model) -> Option<PosteriorPair> {
+    fn filtered(&self, model: &PreciseModel) -> Option<PosteriorPair> {
         let conditions = self.conditions;
         let dwell_s = self.plan.segments.first().map(|s| s.dt * s.steps as f64)?;
         let samples: Vec<usize> = self.plan.segments.iter().map(|s| s.steps).collect();
@@ -101,7 +101,7 @@ impl<'a> Resolution<'a> {
     fn rounded(&self) -> Option<&[PosteriorPair]> {
         let compute = || {
             let (own, mut rng) = (self.model()?, SplitMix64::new(1));
-            let rounded: Vec<Model> = (0..DRAWS).map(|_| own.rounded(ROUNDING, &mut rng)).collect();
+            let rounded: Vec<PreciseModel> = (0..DRAWS).map(|_| own.rounded(ROUNDING, &mut rng)).collect();
             rounded.iter().map(|model| self.filtered(model)).collect()
         };
         self.rounded.get_or_init(compute).as_deref()

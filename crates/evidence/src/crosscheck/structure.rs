@@ -332,9 +332,9 @@ fn verdicts(prediction: &Prediction) -> impl Iterator<Item = QuantityVerdict> + 
 }
 
 impl QuantityVerdict {
-    /// Check of an order against a slope. The coefficients of a combination are doubles, so a rest of it below
-    /// 2^-46 counts as rounding; the contribution of the dwells, as small as the dwell, is then lost too, and
-    /// the slope is that of the degree.
+    /// Check of an order against a slope. The coefficients of a combination are doubles, so a rest of it
+    /// below 2^-46 counts as rounding; the contribution of the dwells, as small as the dwell, is then lost
+    /// too, and the slope is that of the degree.
     fn slope(&self, order: Option<usize>, modelled: bool, dwell_slope: Option<DwellSlope>) -> Check {
         let check = slope(order, modelled, dwell_slope);
         let hides = !self.exact && self.degree.is_some_and(|degree| order.is_none_or(|order| order > degree));
@@ -513,7 +513,8 @@ fn shares_nothing(prediction: &Prediction, k: usize) -> bool {
         .is_some_and(|all| all.iter().enumerate().all(|(i, other)| i == k || !shares(other)))
 }
 
-/// Two unknowns of a null vector and the sign of their correlation, where that is least in size, and its size.
+/// Two unknowns of a null vector and the sign of their correlation, where that is least in size, and its
+/// size.
 fn weakest_correlation(
     vector: &[(usize, f64)],
     correlation: &DMatrix<f64>,

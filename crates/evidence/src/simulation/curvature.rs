@@ -132,8 +132,8 @@ impl SecondOrderTerms {
     }
 }
 
-/// Second differences along `directions` of the outputs of a run, then of its states, about the trajectory `at`
-/// from `x0`: those of the mean, and a column for each direction and each pair.
+/// Second differences along `directions` of the outputs of a run, then of its states, about the trajectory
+/// `at` from `x0`: those of the mean, and a column for each direction and each pair.
 fn second_differences(
     filter: &ExtendedFilter<'_>,
     x0: &PlatformState,

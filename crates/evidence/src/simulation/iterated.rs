@@ -179,9 +179,9 @@ fn settle_in_stages(
     Ok(IterationResult { passes: passes + settled.passes, ..settled })
 }
 
-/// Runs `filter` over the measurements `z` as [`ExtendedFilter::run`] does, then again along the trajectory found,
-/// until it stays. If it does not converge, or fits poorly, longer and longer parts of the run are tried from
-/// the initial estimate too.
+/// Runs `filter` over the measurements `z` as [`ExtendedFilter::run`] does, then again along the trajectory
+/// found, until it stays. If it does not converge, or fits poorly, longer and longer parts of the run are
+/// tried from the initial estimate too.
 ///
 /// # Errors
 /// [`EkfError`] for a number that is not finite, or if `z` belongs to another run.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::digits::{Digits, Functional, Real, Vector};
-use super::model::{LOCAL, Model, Moments};
+use super::model::{LOCAL, Moments, PreciseModel};
 
 /// Motion of psi between the starts of two positions, besides the carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,14 +34,19 @@ impl SampleInformation {
     /// Information of the samples of a filter, at the ends of equal steps, `samples` of them per position.
     /// The first position lasts `dwell / w_ie`. `noise` has the standard deviations of Z and of a measured
     /// azimuth.
-    pub(in super::super) fn of_filter(model: &Model, dwell: f64, samples: &[usize], noise: [f64; 2]) -> Self {
+    pub(in super::super) fn of_filter(
+        model: &PreciseModel,
+        dwell: f64,
+        samples: &[usize],
+        noise: [f64; 2],
+    ) -> Self {
         let d = model.digits;
         let weights = noise.map(|s| d.double(1.0 / (s * s)));
         Self::new(model, &model.moments(dwell, samples, &weights), Between::Dwell)
     }
 
     /// Information of the samples `moments`, one entry for each position.
-    pub(super) fn new(model: &Model, moments: &[Arc<Moments>], between: Between) -> Self {
+    pub(super) fn new(model: &PreciseModel, moments: &[Arc<Moments>], between: Between) -> Self {
         let (d, reset) = (model.digits, model.reset);
         let n = model.unknowns;
         let coefficients = model.drifts[0][0].len();

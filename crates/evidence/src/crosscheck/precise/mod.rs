@@ -13,7 +13,7 @@ mod seen;
 
 pub(super) use digits::{Digits, Functional, add_up, double};
 pub(super) use information::{Between, SampleInformation};
-pub(super) use model::Model;
+pub(super) use model::PreciseModel;
 pub(super) use posterior::Posterior;
 pub(super) use seen::ObservableDirections;
 
@@ -28,7 +28,7 @@ const SAMPLES: usize = 6;
 
 /// Scheme in high precision, with samples over dwells.
 struct SampledModel {
-    model: Model,
+    model: PreciseModel,
     /// Samples by dwell, then by position.
     moments: Vec<Vec<Arc<Moments>>>,
 }
@@ -52,7 +52,7 @@ impl<'a, const DIGITS: usize> Samples<'a, DIGITS> {
     /// separated from rounding.
     pub(super) fn seen(&self, digits: usize, between: Between) -> Option<Vec<ObservableDirections>> {
         let sampled = self.taken[digits].get_or_init(|| {
-            let model = Model::new(self.scheme, Digits { bits: self.bits[digits] })?;
+            let model = PreciseModel::new(self.scheme, Digits { bits: self.bits[digits] })?;
             let samples = vec![SAMPLES; self.scheme.positions.len()];
             // constant noise density: shorter steps have larger noise
             let weights = |dwell: f64| std::array::from_fn(|_| model.digits.double(dwell));

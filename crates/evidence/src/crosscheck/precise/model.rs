@@ -24,7 +24,7 @@ struct PreciseOutput {
 
 /// Model of a scheme in numbers.
 #[derive(Clone)]
-pub(in super::super) struct Model {
+pub(in super::super) struct PreciseModel {
     pub(super) digits: Digits,
     /// Number of unknowns.
     pub(super) unknowns: usize,
@@ -266,7 +266,7 @@ fn outputs(scheme: &Scheme) -> Vec<PreciseOutput> {
     out
 }
 
-impl Model {
+impl PreciseModel {
     /// Model of a scheme without generic angles and rotations, at its latitude. `None` when memory does not
     /// suffice for the constants, or without a latitude.
     pub(in super::super) fn new(scheme: &Scheme, digits: Digits) -> Option<Self> {

@@ -136,8 +136,8 @@ pub fn term_effects(
     })
 }
 
-/// Effect of the error `j` with its `size` in the bench. `shown` is its information in the samples, and the sum
-/// of their squares.
+/// Effect of the error `j` with its `size` in the bench. `shown` is its information in the samples, and the
+/// sum of their squares.
 fn term_effect(
     (platform, model): (&Platform, &OmittedModel),
     j: usize,
