@@ -13,7 +13,7 @@ use super::model::{
 use crate::language::{among, nearest};
 
 /// Nodes by name.
-type Names = HashMap<String, usize>;
+type NodesByName = HashMap<String, usize>;
 
 impl SystemModel {
     /// Graph of a model without faults in its names.
@@ -45,14 +45,14 @@ impl SystemModel {
 struct Compiler<'m> {
     model: &'m SystemModel,
     dag: Dag,
-    /// Names with their roles, in slot order.
+    /// NodesByName with their roles, in slot order.
     roles: Vec<(String, Role)>,
     role_of: HashMap<String, Role>,
     slot_of: HashMap<String, usize>,
     /// Nodes of all slots.
-    slots: Names,
+    slots: NodesByName,
     /// Nodes of known constants.
-    constants: Names,
+    constants: NodesByName,
     /// Place at which each node was written first.
     places: HashMap<usize, (FilePlace, Range<usize>)>,
 }
@@ -60,7 +60,7 @@ struct Compiler<'m> {
 impl<'m> Compiler<'m> {
     fn new(model: &'m SystemModel) -> Self {
         let (mut dag, roles) = (Dag::default(), model.roles());
-        let mut slots = Names::new();
+        let mut slots = NodesByName::new();
         for (slot, (name, _)) in roles.iter().enumerate() {
             slots.insert(name.clone(), dag.slot(slot));
         }
@@ -77,7 +77,7 @@ impl<'m> Compiler<'m> {
     }
 
     /// Node of a formula that may use `names`.
-    fn node(&mut self, formula: &PlacedExpression, names: &Names) -> Result<usize, ModelError> {
+    fn node(&mut self, formula: &PlacedExpression, names: &NodesByName) -> Result<usize, ModelError> {
         let before = self.dag.ops.len();
         let made = self.dag.translate(&formula.expression, &|name| names.get(name).copied());
         let span = |i: usize| formula.expression.spans.get(i).cloned().unwrap_or(0..0);
@@ -94,7 +94,7 @@ impl<'m> Compiler<'m> {
     }
 
     /// Message of an error, with the names that are known.
-    fn explained(&self, error: &DagError, names: &Names) -> String {
+    fn explained(&self, error: &DagError, names: &NodesByName) -> String {
         let is_output = |name: &String| self.model.outputs.iter().any(|o| o.0.name == *name);
         let hint = match error {
             DagError::UnknownName(name) if is_output(name) => {
@@ -115,13 +115,17 @@ impl<'m> Compiler<'m> {
     }
 
     /// Nodes of formulas, in their order.
-    fn nodes(&mut self, formulas: &[PlacedExpression], names: &Names) -> Result<Vec<usize>, ModelError> {
+    fn nodes(
+        &mut self,
+        formulas: &[PlacedExpression],
+        names: &NodesByName,
+    ) -> Result<Vec<usize>, ModelError> {
         formulas.iter().map(|formula| self.node(formula, names)).collect()
     }
 
     /// Nodes of every experiment, and the names in the first one: those in starts, jumps and combinations,
     /// with values that are the same in all experiments.
-    fn experiments(&mut self) -> Result<(Vec<CompiledExperiment>, Names), ModelError> {
+    fn experiments(&mut self) -> Result<(Vec<CompiledExperiment>, NodesByName), ModelError> {
         let model = self.model;
         let mut first = self.slots.clone();
         let mut experiments: Vec<CompiledExperiment> = Vec::new();
@@ -159,7 +163,7 @@ impl<'m> Compiler<'m> {
             model.segments.iter().flat_map(|s| &s.constants).map(|(name, _)| name.as_str()).collect();
         let mut out = Vec::new();
         // names in the value of a constant: other constants that come before
-        let mut before = Names::new();
+        let mut before = NodesByName::new();
         for (i, (named, _)) in model.constants.iter().enumerate() {
             let formula = model.constant_formula(experiment, i);
             let node = formula.map(|f| self.node(f, &before)).transpose()?;
@@ -173,9 +177,9 @@ impl<'m> Compiler<'m> {
         Ok(out)
     }
 
-    /// Names in the equations of an experiment: slots, known inputs that are functions of time, and
+    /// NodesByName in the equations of an experiment: slots, known inputs that are functions of time, and
     /// definitions.
-    fn names_in(&mut self, experiment: usize) -> Result<Names, ModelError> {
+    fn names_in(&mut self, experiment: usize) -> Result<NodesByName, ModelError> {
         let model = self.model;
         let mut inside = self.slots.clone();
         for (i, (named, _)) in model.known_inputs.iter().enumerate() {
@@ -195,8 +199,8 @@ impl<'m> Compiler<'m> {
         Ok(inside)
     }
 
-    /// Names in a known start: constants, parameters, and states whose start is not given by a formula.
-    fn names_of_starts(&self, names: &Names) -> Names {
+    /// NodesByName in a known start: constants, parameters, and states whose start is not given by a formula.
+    fn names_of_starts(&self, names: &NodesByName) -> NodesByName {
         let mut out = self.constants.clone();
         for p in &self.model.parameters {
             out.insert(p.name.clone(), names[&p.name]);
@@ -208,7 +212,7 @@ impl<'m> Compiler<'m> {
     }
 
     /// Nodes of known starts, by state.
-    fn starts(&mut self, names: &Names) -> Result<Vec<Option<usize>>, ModelError> {
+    fn starts(&mut self, names: &NodesByName) -> Result<Vec<Option<usize>>, ModelError> {
         let mut starts = Vec::new();
         for s in &self.model.states {
             starts.push(match &s.start {
@@ -239,7 +243,11 @@ impl<'m> Compiler<'m> {
     }
 
     /// Nodes of all segments.
-    fn segments(&mut self, names: &Names, start_names: &Names) -> Result<Vec<CompiledSegment>, ModelError> {
+    fn segments(
+        &mut self,
+        names: &NodesByName,
+        start_names: &NodesByName,
+    ) -> Result<Vec<CompiledSegment>, ModelError> {
         let model = self.model;
         model.segments.iter().map(|segment| self.segment(segment, names, start_names)).collect()
     }
@@ -247,8 +255,8 @@ impl<'m> Compiler<'m> {
     fn segment(
         &mut self,
         segment: &ModelSegment,
-        names: &Names,
-        start_names: &Names,
+        names: &NodesByName,
+        start_names: &NodesByName,
     ) -> Result<CompiledSegment, ModelError> {
         let mut compiled = CompiledSegment::default();
         for (name, formula) in &segment.constants {
@@ -271,7 +279,7 @@ impl<'m> Compiler<'m> {
     }
 
     /// Nodes of the constraints, each checked once it is made.
-    fn constraints(&mut self, names: &Names) -> Result<Vec<usize>, ModelError> {
+    fn constraints(&mut self, names: &NodesByName) -> Result<Vec<usize>, ModelError> {
         let model = self.model;
         let mut constraints = Vec::new();
         for formula in &model.constraints {
