@@ -15,6 +15,7 @@ use crate::record::Record;
 /// Largest deviation of the time stamps from the timeline of the scheme, as a fraction of an interval, unless
 /// the file states one.
 pub(super) const TOLERANCE: f64 = 0.05;
+
 /// Source of the positions of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum By {
