@@ -45,7 +45,7 @@ impl SystemModel {
 struct Compiler<'m> {
     model: &'m SystemModel,
     dag: Dag,
-    /// NodesByName with their roles, in slot order.
+    /// Names with their roles, in slot order.
     roles: Vec<(String, Role)>,
     role_of: HashMap<String, Role>,
     slot_of: HashMap<String, usize>,
