@@ -513,9 +513,9 @@ impl RandomValues {
     }
 }
 
-/// Turns to every station ([`PlatformPoint::turns`]) in a ring. `at` gives one turn of a path from the attitude at
-/// its start; if it is the only turn, the attitude at its end is given too. `arrives` is true if a path ends
-/// at the attitude required.
+/// Turns to every station ([`PlatformPoint::turns`]) in a ring. `at` gives one turn of a path from the
+/// attitude at its start; if it is the only turn, the attitude at its end is given too. `arrives` is true if
+/// a path ends at the attitude required.
 ///
 /// # Errors
 /// Index of the first position whose path `at` does not give, or does not lead there.

@@ -290,8 +290,8 @@ impl Default for StepHistory {
 }
 
 impl StepHistory {
-    /// Counts a step of this length at a point of size `far`. True if the steps lead to a point with dependent
-    /// gradients.
+    /// Counts a step of this length at a point of size `far`. True if the steps lead to a point with
+    /// dependent gradients.
     fn end_at_dependent<const N: usize>(&mut self, linear: &Linear<N>, length: f64, far: f64) -> bool {
         // near a point with dependent gradients the steps shrink by a constant factor, and so do both sides
         let stays = linear.far > FAR && linear.far > self.far_before - GAIN / 2.0 && linear.shift < NEAR;
