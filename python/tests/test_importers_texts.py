@@ -15,6 +15,7 @@ import sympy
 from conftest import ROOT, shared, statuses
 from toml_numbers import value
 
+import obsdeg
 from obsdeg.importers import (
     ImportProblem,
     exporters,
@@ -186,6 +187,9 @@ LINES: list[tuple[Any, str, str, str]] = [
     (sijl.read, "@ODEmodel(\n x' = a*x(t),\n y(t) = x(t)\n)", "line 2", "`x' = a*x(t)`"),
     (sijl.read, "@ODEmodel(\n x'(t) = a*x(t)\n)", "", "no output"),
     (sijl.read, "@ODEmodel(\n x'(t) = a*x(t),\n", "line 3", "the end of the text"),
+    (sijl.read, "@DDSmodel(\n x(t + 2) = a*x(t),\n y(t) = x(t)\n)", "line 2", "`x(t + 2) = a*x(t)`"),
+    (sijl.read, "@DDSmodel(\n x'(t) = a*x(t),\n y(t) = x(t)\n)", "line 2", "`x'(t) = a*x(t)`"),
+    (sijl.read, "@DDSmodel(\n x(t + 1) = t*x(t),\n y(t) = x(t)\n)", "line 2", "the time `t`"),
     (sijl.read, "ode = 1", "", "0 `@ODEmodel(`"),
     (sijl.read, "@ODEmodel(\n x'(t) = a*y(t),\n y(t) = x(t)\n)", "line 2", "the output `y`"),
     (sympy_system.read, "rates = {x: f(x)}\noutputs = {'y': x}", "line 1", "the function `f`"),
@@ -206,6 +210,28 @@ def test_what_is_not_read_is_refused_by_construct_and_line(reader: Any, text: st
     with pytest.raises(ImportProblem) as found:
         reader(text)
     assert found.value.place == place and construct in found.value.construct and found.value.expected
+
+
+def test_discrete_time(tmp_path: Path) -> None:
+    """The epidemic of the tutorial of StructuralIdentifiability.jl, with its Greek letters: read, judged, written
+    and read again."""
+    text = """dds = @DDSmodel(
+        S(t + 1) = S(t) - β * S(t) * I(t),
+        I(t + 1) = I(t) + β * S(t) * I(t) - α * I(t),
+        R(t + 1) = R(t) + α * I(t),
+        y(t) = I(t)
+    )"""
+    path = tmp_path / "sir.jl"
+    path.write_text(text, encoding="utf-8")
+    found = obsdeg.analyze(load(path))
+    assert found.statuses == {"S": "observable", "I": "observable", "R": "not_excited", "α": "observable", "β": "observable"}
+    # I[t+1]/I is 1 + βS - α; of the next quotients one gives β^2 S, the other β
+    assert found.degrees == {"S": 3, "I": 0, "R": None, "α": 3, "β": 3}
+    assert found.discrete is True and found.equations[0].startswith("S[t+1] = ")
+    back = exporters.to_si_jl(to_toml(sijl.load(path)))
+    assert "@DDSmodel" in back and statuses(to_toml(sijl.read(back))) == found.statuses
+    with pytest.raises(ImportProblem, match="discrete time"):
+        exporters.to_sympy(sijl.load(path))
 
 
 def test_known_constants_are_outputs_of_their_own_elsewhere() -> None:

@@ -14,6 +14,7 @@ mod compare;
 mod conventions;
 mod crosscheck;
 mod design;
+mod discrete;
 mod engines;
 mod examples;
 mod expressions;

@@ -67,10 +67,13 @@ fn solutions(q: &SystemQuantity) -> String {
 fn counting(a: &SystemAnalysis) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(order) = a.counting_order {
+        let with = match a.discrete {
+            true => format!("with the outputs up to t+{order}"),
+            false => format!("with derivatives up to order {order}"),
+        };
         out.push(format!(
-            "solutions without an expression are counted by elimination, complex ones too, with derivatives \
-             up to order {order} at a random point modulo each prime; no bound on the probability of an \
-             error is derived"
+            "solutions without an expression are counted by elimination, complex ones too, {with} at a random \
+             point modulo each prime; no bound on the probability of an error is derived"
         ));
     }
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -202,6 +205,7 @@ fn directions(a: &SystemAnalysis) -> Option<DocumentBlock> {
     }));
     // derivatives of higher order than the bound may change
     let heading = match a.rests_on_bound {
+        true if a.discrete => format!("No output up to t+{} changes when you", a.last_order),
         true => {
             format!("No derivative up to order {} changes at the start when you", a.last_order)
         }
@@ -229,7 +233,12 @@ fn assumed(a: &SystemAnalysis) -> Vec<String> {
         assumed.push(kept_constraints(a));
         assumed.extend(a.constraint_factors.iter().map(chosen_factor));
     }
-    assumed.push(last_order(a));
+    assumed.extend(a.discrete.then(|| {
+        "discrete time: a degree is the number of steps, so that outputs up to y[t+degree] determine the \
+         unknown at t"
+            .into()
+    }));
+    assumed.push(if a.discrete { last_step(a) } else { last_order(a) });
     assumed.push(
         "observable and degree are meant locally: around a generic point no other value gives the same \
          outputs up to that order; how many values there are in all is said where it was decided, and \
@@ -317,6 +326,21 @@ fn chosen_factor(w: &ConstraintFactor) -> String {
             false => "the first with a real point of its own, unknowns alone last",
         }
     )
+}
+
+/// Sentence on the last step in discrete time that was looked at.
+fn last_step(a: &SystemAnalysis) -> String {
+    let last = a.last_order;
+    if a.closed {
+        format!("outputs up to t+{last} were looked at, and those of later steps add nothing")
+    } else if a.rests_on_bound {
+        format!(
+            "outputs up to t+{last} were looked at, and what is not observable rests on this bound (--order sets \
+             another)"
+        )
+    } else {
+        format!("everything is observable with outputs up to t+{last}")
+    }
 }
 
 /// Sentence on the last order of derivatives that was looked at.

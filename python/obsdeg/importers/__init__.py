@@ -1,6 +1,6 @@
 """Models from elsewhere in obsdeg's own format.
 
-`load` reads SBML, PEtab problems, `@ODEmodel` texts of StructuralIdentifiability.jl, MATLAB scripts of
+`load` reads SBML, PEtab problems, `@ODEmodel` and `@DDSmodel` texts of StructuralIdentifiability.jl, MATLAB scripts of
 STRIKE-GOLDD, systems written with SymPy, and obsdeg's own models and schemes. An unsupported construct raises
 an `ImportProblem`, which names construct and place.
 """
@@ -130,7 +130,7 @@ def _kind(text: str, path: Path) -> tuple[str, str]:
         raise ImportProblem("XML that is no SBML", "<sbml ...>", file=str(path))
     if re.search(r"^format_version\s*:", text, re.MULTILINE):
         return "PEtab", "petab"
-    if "@ODEmodel" in text:
+    if "@ODEmodel" in text or "@DDSmodel" in text:
         return "SI.jl", "sijl"
     if ending == ".m" or (re.search(r"^\s*syms\s", text, re.MULTILINE) and re.search(r"^\s*save\b", text, re.MULTILINE)):
         return "STRIKE-GOLDD", "strike_goldd"
@@ -142,5 +142,5 @@ def _kind(text: str, path: Path) -> tuple[str, str]:
         return "model", ""
     if ending == ".toml" or re.search(r"^\s*(\[\[position\]\]|positions?\s*=|angles\s*=)", text, re.MULTILINE):
         return "scheme", ""
-    expected = "SBML, PEtab (its YAML), @ODEmodel, a script of STRIKE-GOLDD, SymPy, or a model or scheme of obsdeg"
+    expected = "SBML, PEtab (its YAML), @ODEmodel, @DDSmodel, a script of STRIKE-GOLDD, SymPy, or a model or scheme of obsdeg"
     raise ImportProblem(f"a file of no known kind (`{ending or path.name}`)", expected, file=str(path))

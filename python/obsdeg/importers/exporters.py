@@ -40,7 +40,7 @@ def read_model(model: str | Text) -> System:
             raise ImportProblem(words, "one run from a free start", place=f"[{key}]")
     if file.get("experiments", 1) != 1:
         raise ImportProblem(f"{file['experiments']} experiments", "one", place="experiments")
-    out = System(str(file.get("name", "model")), str(file.get("description", "")))
+    out = System(str(file.get("name", "model")), str(file.get("description", "")), discrete=bool(file.get("discrete", False)))
 
     def formula(value: Any, place: str) -> Expr:
         if isinstance(value, int | float):
@@ -100,7 +100,7 @@ def _json(text: str) -> System:
 
 
 def to_si_jl(model: str | Text | System, *, name: str = "ode") -> str:
-    """Text of `@ODEmodel` for StructuralIdentifiability.jl.
+    """Text of `@ODEmodel`, in discrete time of `@DDSmodel`, for StructuralIdentifiability.jl.
 
     Arguments:
         model: A `Model`, its text (TOML or JSON), or a system.
@@ -139,7 +139,8 @@ def to_si_jl(model: str | Text | System, *, name: str = "ode") -> str:
         if s.start is not None and not isinstance(s.start, str):
             raise ImportProblem(f"the start of `{n}`", "unknown starts, or known ones of any value", place=f"the start of {n}")
         known += [n] if s.start == "known" else []
-        lines.append(f"    {n}'(t) = {text(s.rate, f'the equation of {n}')}")
+        left = f"{n}(t + 1)" if system.discrete else f"{n}'(t)"
+        lines.append(f"    {left} = {text(s.rate, f'the equation of {n}')}")
     generic = [n for n, v in system.constants.items() if v is None and n in system.used()]
     for n, y in {**system.outputs, **{f"known_{c}": sympy.Symbol(c) for c in generic}}.items():
         label = n
@@ -149,7 +150,7 @@ def to_si_jl(model: str | Text | System, *, name: str = "ode") -> str:
         lines.append(f"    {label}(t) = {text(y, f'the output {n}')}")
     # functions of SI.jl take known starts as an argument
     tail = f"known_ic = [{', '.join(known)}]\n" if known else ""
-    return f"using StructuralIdentifiability\n\n{name} = @ODEmodel(\n" + ",\n".join(lines) + "\n)\n" + tail
+    return f"using StructuralIdentifiability\n\n{name} = @{'DDS' if system.discrete else 'ODE'}model(\n" + ",\n".join(lines) + "\n)\n" + tail
 
 
 def to_sympy(model: str | Text | System) -> str:
@@ -157,10 +158,12 @@ def to_sympy(model: str | Text | System) -> str:
     it.
 
     Raises:
-        ImportProblem: segments, constraints, or bounded inputs.
+        ImportProblem: discrete time, segments, constraints, or bounded inputs.
     """
     system = model if isinstance(model, System) else read_model(model)
     _plain(system)
+    if system.discrete:
+        raise ImportProblem("discrete time", "derivatives by time")
     system = _python_names(system)
     names = system.names()
     imports = f"from sympy import {', '.join(_IMPORTED)}"

@@ -1,7 +1,7 @@
-"""Models of StructuralIdentifiability.jl: the text of its macro `@ODEmodel`.
+"""Models of StructuralIdentifiability.jl: the text of its macros `@ODEmodel` and `@DDSmodel`.
 
-`x'(t) = ...` declares a state, `y(t) = ...` an output. Any other function of the time is a known input, and
-every other name an unknown parameter.
+`x'(t) = ...` declares a state, in discrete time `x(t + 1) = ...`, and `y(t) = ...` an output. Any other function
+of the time is a known input, and every other name an unknown parameter.
 """
 
 from __future__ import annotations
@@ -14,15 +14,19 @@ from .limits import EQUATIONS, text_of_file
 from .problem import ImportProblem, OverLimit
 from .system import State, System
 
-_MACRO = re.compile(r"@ODEmodel\s*\(")
-_LEFT = re.compile(r"\s*([^\W\d][\w!]*)\s*('?)\s*\(\s*t\s*\)\s*$")
+_MACRO = re.compile(r"@(ODE|DDS)model\s*\(")
+_LEFT = {
+    "ODE": re.compile(r"\s*([^\W\d][\w!]*)\s*('?)\s*\(\s*t\s*\)\s*$"),
+    "DDS": re.compile(r"\s*([^\W\d][\w!]*)\s*\(\s*t\s*(\+\s*1)?\s*\)\s*$"),
+}
+_EXPECTED = {"ODE": "x'(t) = ... or y(t) = ...", "DDS": "x(t + 1) = ... or y(t) = ..."}
 _OF_TIME = re.compile(r"([^\W\d][\w!]*)\s*\(\s*t\s*\)")
 # 2x, 3(a + b): a number in front multiplies; in 1e5*x the number is 1e5
 _COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)(?=[^\W\d]|\()")
 
 
 def load(path: str | Path, *, model: int = 1) -> System:
-    """System of the n-th `@ODEmodel` of a file.
+    """System of the n-th `@ODEmodel` or `@DDSmodel` of a file.
 
     Raises:
         ImportProblem: not such a model.
@@ -34,18 +38,20 @@ def load(path: str | Path, *, model: int = 1) -> System:
 
 
 def read(text: str, *, model: int = 1, name: str = "model") -> System:
-    """System of the n-th `@ODEmodel` of a text.
+    """System of the n-th `@ODEmodel` or `@DDSmodel` of a text.
 
     Raises:
         ImportProblem: not such a model.
     """
     text = re.sub(r"#=.*?=#", lambda m: "\n" * m.group().count("\n"), text, flags=re.DOTALL)
     text = re.sub(r"#[^\n]*", "", text)
-    starts = [m.end() for m in _MACRO.finditer(text)]
+    macros = list(_MACRO.finditer(text))
+    starts = [m.end() for m in macros]
     if not 1 <= model <= len(starts):
-        raise ImportProblem(f"{len(starts)} `@ODEmodel(`", f"at least {model} of them")
+        raise ImportProblem(f"{len(starts)} `@ODEmodel(` or `@DDSmodel(`", f"at least {model} of them")
+    kind = macros[model - 1].group(1)
     named = re.search(r"([^\W\d]\w*)\s*=\s*$", text[: text.rindex("@", 0, starts[model - 1])])
-    system = System(named.group(1) if named else name)
+    system = System(named.group(1) if named else name, discrete=kind == "DDS")
     of_time: dict[str, str] = {}
     outputs: dict[str, tuple[str, str]] = {}
     rates: dict[str, tuple[str, str]] = {}
@@ -55,11 +61,11 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
     for line, equation in equations:
         place = f"line {line}"
         left, equals, right = equation.partition("=")
-        found = _LEFT.match(left)
+        found = _LEFT[kind].match(left)
         if not equals or not found:
-            raise ImportProblem(f"`{' '.join(equation.split())}`", "x'(t) = ... or y(t) = ...", place=place)
-        label, prime = found.groups()
-        target = rates if prime else outputs
+            raise ImportProblem(f"`{' '.join(equation.split())}`", _EXPECTED[kind], place=place)
+        label, state = found.groups()
+        target = rates if state else outputs
         if label in rates or label in outputs:
             raise ImportProblem(f"a second equation of `{label}`", "one", place=place)
         target[label] = (right, place)
@@ -71,7 +77,8 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
         except ImportProblem as problem:
             raise problem.located(place=place) from None
         if "t" in names_in(expression):
-            raise ImportProblem("the time `t` by itself", "functions of it, as x(t)", place=place, hint="make it a state: clock'(t) = 1")
+            clock = "clock'(t) = 1" if kind == "ODE" else "clock(t + 1) = clock(t) + 1"
+            raise ImportProblem("the time `t` by itself", "functions of it, as x(t)", place=place, hint=f"make it a state: {clock}")
         return expression
 
     for label, (right, place) in [*rates.items(), *outputs.items()]:

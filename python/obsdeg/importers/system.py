@@ -71,6 +71,7 @@ class System:
         carry: States that jump at the beginning of each segment.
         constraints: Expressions that are zero at the start.
         notes: Remarks on the import for readers of an answer.
+        discrete: True in discrete time: the rate of a state is its value one step later.
     """
 
     name: str
@@ -87,6 +88,7 @@ class System:
     carry: list[dict[str, Expr]] = field(default_factory=list)
     constraints: list[Expr] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    discrete: bool = False
 
     def names(self) -> list[str]:
         """All names that expressions may contain, in the order of the file."""
@@ -183,6 +185,8 @@ def to_toml(system: System) -> str:
     lines += [f"name = {_quoted(system.name)}"]
     if system.description:
         lines += [f"description = {_quoted(system.description)}"]
+    if system.discrete:
+        lines += ["discrete = true"]
     tables = {n: v for n, v in system.constants.items() if isinstance(v, tuple)}
     own = [
         [f"{key(n)} = {text(t[e][0], n)}" for n, t in tables.items() if any(row != t[0] for row in t)] for e in range(system.experiments)

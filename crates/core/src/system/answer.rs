@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::branches::{BranchSide, branches};
 use super::constraints::ConstraintFactor;
 use super::counts::{Count, CountLimits, Solutions, values_taken};
+use super::discrete::analyze_discrete;
 use super::error::ModelError;
 use super::functions::gcd;
 use super::identifiable::{identifiable_functions, terms_of};
@@ -80,6 +81,10 @@ pub struct SystemAnalysis {
     pub last_order: usize,
     /// Order of derivatives at which the search ends at the latest.
     pub bound: usize,
+    /// True for a model in discrete time: orders and degrees count steps, `y[t+1]`, instead of derivatives.
+    /// Left out for a model in continuous time.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub discrete: bool,
     /// True if the end is proven: an order that adds nothing is the last. If false, unobservable verdicts
     /// hold up to the bound on the order only.
     pub closed: bool,
@@ -183,7 +188,7 @@ impl SystemQuantity {
     }
 
     /// Identifiability that follows from the verdict and the number of solutions.
-    fn identifiability(&self) -> Identifiability {
+    pub(super) fn identifiability(&self) -> Identifiability {
         match (self.status, &self.number_of_solutions) {
             (
                 Status::Observable,
@@ -316,6 +321,22 @@ impl Default for SystemOptions {
 /// # Errors
 /// [`ModelError`].
 pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<SystemAnalysis, ModelError> {
+    match model.discrete {
+        true => analyze_discrete(model, options),
+        false => analyzed(model, options).map(|found| found.analysis),
+    }
+}
+
+/// Analysis of a model with what it rests on.
+pub(super) struct Analyzed {
+    pub(super) analysis: SystemAnalysis,
+    pub(super) judged: Judgement,
+    /// Identifiable functions, in the order of the invariants of the analysis.
+    pub(super) functions: Vec<Terms>,
+}
+
+/// Analysis of a model in continuous time.
+pub(super) fn analyzed(model: &SystemModel, options: SystemOptions) -> Result<Analyzed, ModelError> {
     let SystemOptions { seed, order, .. } = options;
     let compiled = model.compile()?;
     let judged = judge_compiled(model, &compiled, seed, order)?;
@@ -339,7 +360,7 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
         time => time.number().to_string(),
     });
     if !options.solutions {
-        return Ok(out);
+        return Ok(Analyzed { analysis: out, judged, functions: listed });
     }
     let limits = CountLimits {
         count: options.count_limit.saturating_mul(1_000_000),
@@ -368,7 +389,7 @@ pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<Sys
     }
     let counted = |q: &SystemQuantity| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(_)));
     out.counting_order = out.quantities.iter().any(counted).then_some(counting_order);
-    Ok(out)
+    Ok(Analyzed { analysis: out, judged, functions: listed })
 }
 
 /// Name of the output that equals a state, or of the output derivative that equals it: `y`, `y'`, `y''`;
@@ -464,6 +485,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         symmetries: symmetry_reports(model, judged, symmetries),
         last_order: findings.degrees.rank_profile.len().saturating_sub(1),
         bound: judged.layout.bound,
+        discrete: false,
         closed: judged.layout.closed,
         rests_on_bound: judged.rests_on_bound,
         branches: Vec::new(),

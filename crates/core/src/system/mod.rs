@@ -15,6 +15,7 @@ mod compile;
 pub(crate) mod constraints;
 mod counts;
 pub(crate) mod dag;
+mod discrete;
 mod elimination;
 mod error;
 mod evaluation;

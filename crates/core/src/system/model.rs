@@ -170,6 +170,8 @@ pub struct SystemModel {
     pub description: String,
     /// Title block of its review.
     pub document: TitleBlock,
+    /// True in discrete time: equations of states give their next values, `x[t+1] = f(x, u, p, t)`.
+    pub discrete: bool,
     /// States of the system.
     pub states: Vec<State>,
     /// Unknown constants.
@@ -420,7 +422,8 @@ impl SystemModel {
         }
         let inputs = inputs.iter().map(|(name, at, f)| (*name, at.as_str(), *f));
         let definitions = self.definitions.iter().map(|(n, e)| (n, "", e));
-        let states = self.states.iter().map(|s| (&s.named.name, "'", &s.equation));
+        let next = if self.discrete { "[t+1]" } else { "'" };
+        let states = self.states.iter().map(|s| (&s.named.name, next, &s.equation));
         let outputs = self.outputs.iter().map(|(n, e)| (&n.name, "", e));
         let base = |name: &str| name.split('[').next().unwrap_or_default().to_string();
         let mut out = Vec::new();
@@ -502,6 +505,10 @@ impl SystemModel {
     /// [`ModelError`] for names that are unknown, defined twice or reserved, and for expressions that are
     /// never defined.
     pub fn compile(&self) -> Result<Compiled, ModelError> {
+        if self.discrete {
+            let message = "in discrete time; expected a model in continuous time (`analyze` judges both)".into();
+            return Err(ModelError { what: "the model".into(), message, span: None });
+        }
         self.check()?;
         let found = self.states.len() + self.parameters.len();
         if found > MAX_UNKNOWNS {

@@ -39,6 +39,11 @@ pub struct ModelFile {
     #[serde(default)]
     #[schemars(with = "Option<TitleBlock>")]
     document: Option<Spanned<TitleBlock>>,
+    /// True for a model in discrete time: the equation of a state is its value one step later,
+    /// `x = "a*x"` for `x[t+1] = a x[t]`, and degrees count steps. `analyze` judges such models; the other
+    /// commands refuse them.
+    #[serde(default)]
+    discrete: bool,
     /// States: the derivative, `x = "-a*x"`, or a table with equation, initial ("known", or an exact value),
     /// unit, description. If there are none, the outputs depend on parameters and inputs alone.
     #[serde(default)]
@@ -521,6 +526,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     let mut model = SystemModel {
         name: file.name.clone().unwrap_or_default(),
         description: file.description.clone(),
+        discrete: file.discrete,
         document: r.title_block(&file)?,
         experiments: r.number_of_experiments(&file)?,
         ..SystemModel::default()
@@ -552,11 +558,11 @@ fn check_whole(text: &str, is_named: bool, model: &SystemModel) -> Result<(), Mo
         |e: ModelError| ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e };
     model.check().map_err(placed)?;
     if !model.candidates.is_empty() {
-        model.measuring(&model.candidates, true).0.compile().map_err(placed)?;
+        model.measuring(&model.candidates, true).0.checked().map_err(placed)?;
     }
     // the missing name concerns no equation: faults of these are reported first
     if !is_named {
-        model.compile().map_err(placed)?;
+        model.checked().map_err(placed)?;
         return Err(ModelError {
             what: "the model file".into(),
             message: "the key `name` is missing; expected it at the top of the file".into(),
