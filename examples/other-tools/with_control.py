@@ -2,9 +2,10 @@
 
     python examples/other-tools/with_control.py
 
-The cells of a rod exchange heat with their neighbours at 1e-4 1/s = 0.36 1/h. One end of six cells is heated and measured. `control.obsv` gives the matrix of
-C, C A, C A^2, ..., whose rows become smaller by 1e-4 each in seconds: its numeric rank is too small. obsdeg judges the same numbers as
-exact decimals. Measured in the middle cell of five, the rod is not observable in truth, and obsdeg tells what is.
+The cells of a rod exchange heat with their neighbours at 1e-4 1/s = 0.36 1/h. One end of six cells is heated and measured.
+`control.obsv` gives the matrix of C, C A, C A^2, ..., whose rows become smaller by 1e-4 each in seconds: its numeric rank is too small.
+obsdeg judges the same numbers as exact decimals. A rod of five cells that is measured in the middle is not observable, and obsdeg names
+what is observable instead.
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ def _read(name: str, value: Any) -> Any:
         return value
 
 
-#: The tasks of a sweep have few values of an option. Whole numbers and floats of the same value are not one key.
+#: The tasks of a sweep have few values of an option. 1, 1.0 and True are different keys.
 _scalar = lru_cache(maxsize=10_000, typed=True)(_read)
 
 

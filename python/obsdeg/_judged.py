@@ -122,7 +122,7 @@ class Judged:
     count: int
 
 
-#: Tasks, the folder for their file if the worker may see it, and the seconds after which no further task begins.
+#: Tasks, the folder for their file if the worker may see it, and the seconds after which no other task begins.
 Chunk = tuple[list[dict[str, Any]], "str | None", "float | None"]
 
 

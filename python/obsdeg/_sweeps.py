@@ -164,7 +164,8 @@ def to_xarray(rows: pandas.DataFrame, dims: Sequence[str] | None = None) -> xarr
     try:
         import xarray
     except ModuleNotFoundError:
-        raise ImportError("a data set is made with the package `xarray`, which is not installed: pip install xarray") from None
+        message = "a data set is made with the package `xarray`, which is not installed: pip install xarray"
+        raise ImportError(message) from None
     asked = [str(name) for name in rows.columns if name not in ("task", *FOUND)]
     tasks = rows.groupby("task").first()
     if dims is None:
@@ -174,22 +175,22 @@ def to_xarray(rows: pandas.DataFrame, dims: Sequence[str] | None = None) -> xarr
     if not dims:
         raise ValueError("dims: found no tag or option with more than one value; expected one")
     if (missing := tasks[list(dims)].isna().any(axis=1)).any():
-        raise ValueError(f"dims: found task {missing.idxmax()} without a value of {', '.join(dims)}; expected one of each")
+        found = f"task {missing.idxmax()} without a value of {', '.join(dims)}"
+        raise ValueError(f"dims: found {found}; expected one of each")
     if (double := tasks.duplicated(list(dims), keep=False)).any():
         same = " and ".join(map(str, tasks.index[double][:2]))
         raise ValueError(f"dims: found tasks {same} with the same {', '.join(dims)}; expected different ones")
     judged = rows[rows["name"].notna()]
-    numbers = {name: "float64" for name in ("rank", "degree", "sigma") if name in rows}
-    of_tasks = tasks[[name for name in ("rank", "error") if name in rows and name in tasks]].astype({"rank": "float64"})
+    of_tasks = tasks[[name for name in ("rank", "error") if name in rows]].astype({"rank": "float64"})
     of_tasks.index = _index(tasks, dims)
     kinds = [name for name in ("status", "degree", "sigma", "unit", "outcome") if name in rows]
-    of_unknowns = judged[kinds].astype({name: kind for name, kind in numbers.items() if name in kinds})
+    of_unknowns = judged[kinds].astype({name: "float64" for name in ("degree", "sigma") if name in kinds})
     of_unknowns.index = _index(judged, [*dims, "name"])
     data = xarray.merge([of_tasks.to_xarray(), of_unknowns.to_xarray()], join="outer")
     # texts in the order of the table, numbers by size
-    order = {name: list(rows[name].dropna().unique()) for name in (*dims, "name") if data[name].dtype.kind not in "iuf"}
-    found: xarray.Dataset = data.sel(order)
-    return found
+    texts = [name for name in (*dims, "name") if data[name].dtype.kind not in "iufb"]
+    ordered: xarray.Dataset = data.sel({name: list(rows[name].dropna().unique()) for name in texts})
+    return ordered
 
 
 def _index(frame: pandas.DataFrame, names: Sequence[str]) -> pandas.Index:

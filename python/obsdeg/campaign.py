@@ -42,7 +42,8 @@ from ._judged import done as there_in
 from ._sweeps import read, table, threads, to_xarray
 from ._work import END, INPUT, CampaignError, Ended, Work
 
-__all__ = ["CampaignError", "Executors", "RayExecutor", "design", "grid", "processes", "read", "run", "sweep", "table", "threads", "to_xarray"]
+__all__ = ["CampaignError", "Executors", "RayExecutor"]
+__all__ += ["design", "grid", "processes", "read", "run", "sweep", "table", "threads", "to_xarray"]
 
 #: Seconds of work per file of a sweep, if the size of chunks follows the measured time.
 FILE_SECONDS = 10.0
@@ -358,7 +359,8 @@ def sweep(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     with _alone(folder) as stage:
-        _sweep(folder, stage, tasks, _Chunks(chunk, length_hint(tasks)), executor, retries, errors == "record", heard)
+        chunks = _Chunks(chunk, length_hint(tasks))
+        _sweep(folder, stage, tasks, chunks, executor, retries, errors == "record", heard)
     return folder
 
 

@@ -96,13 +96,15 @@ def test_a_data_set_of_xarray() -> None:
     rows = campaign.table(tasks)
     data = campaign.to_xarray(rows)
     assert isinstance(data, xarray.Dataset) and dict(data.sizes) == {"x": 2, "side": 2, "latitude": 3, "name": 15}
-    assert set(data.data_vars) == {"rank", "status", "degree", "error"} and data["rank"].dims == data["error"].dims == ("x", "side", "latitude")
+    assert set(data.data_vars) == {"rank", "status", "degree", "error"}
+    assert data["rank"].dims == data["error"].dims == ("x", "side", "latitude")
     # numbers by size, texts and unknowns in the order of the table
     assert data["x"].values.tolist() == [0, 30] and data["side"].values.tolist() == ["west", "east"]
     assert data["name"].values.tolist() == rows["name"].dropna().unique().tolist()
     # a task with an error has missing values and its message
-    assert data["degree"].sel(latitude=95).isnull().all() and data["status"].sel(latitude=95).isnull().all() and data["rank"].sel(latitude=95).isnull().all()
-    assert data["error"].sel(latitude=[0, 45]).isnull().all() and "95 is out of range" in str(data["error"].sel(x=0, side="east", latitude=95).item())
+    assert all(data[name].sel(latitude=95).isnull().all() for name in ("rank", "status", "degree"))
+    assert data["error"].sel(latitude=[0, 45]).isnull().all()
+    assert "95 is out of range" in data["error"].sel(x=0, side="east", latitude=95).item()
     for row in rows[rows["error"].isna()].itertuples():
         cell = data.sel(x=row.x, side=row.side, latitude=row.latitude, name=row.name)
         assert cell["status"].item() == row.status and cell["rank"].item() == row.rank
@@ -113,10 +115,12 @@ def test_a_data_set_of_xarray() -> None:
 
 def test_a_data_set_needs_dimensions_that_tell_tasks_apart() -> None:
     pytest.importorskip("xarray", reason="xarray is not installed")
-    rows = campaign.table([dict(angles=PAIR, latitude=at, tags={"x": x} if x else {}) for x in (1, 2) for at in (0, 45)] + [dict(angles=PAIR, latitude=10)])
-    for dims, message in {("x",): "task 4 without a value of x", ("y",): "found 'y'; expected some of x, latitude", ("latitude",): "tasks 0 and 2 with the same latitude"}.items():
-        with pytest.raises(ValueError, match=f"dims: .*{message}"):
-            campaign.to_xarray(rows, dims)
+    tasks: list[dict[str, Any]] = [dict(angles=PAIR, latitude=at, tags={"x": x}) for x in (1, 2) for at in (0, 45)]
+    rows = campaign.table([*tasks, dict(angles=PAIR, latitude=10)])
+    messages = {"x": "task 4 without a value of x", "y": "'y'; expected some of x, latitude", "latitude": "tasks 0 and 2 with the same latitude"}
+    for dims, message in messages.items():
+        with pytest.raises(ValueError, match=f"dims: found {message}"):
+            campaign.to_xarray(rows, [dims])
     with pytest.raises(ValueError, match="no tag or option with more than one value"):
         campaign.to_xarray(rows[rows["task"] == 0])
 
