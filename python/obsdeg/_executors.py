@@ -89,7 +89,7 @@ def workers_of(pool: Executor) -> int:
     client = _dask(pool)
     if client is not None:
         try:
-            return sum(worker["nthreads"] for worker in _identity(client)["workers"].values())
+            return int(_identity(client)["total_threads"])
         except Exception:  # `unreachable` reports a scheduler that does not answer
             return 1
     counted = getattr(pool, "workers", None)
@@ -113,10 +113,10 @@ def unreachable(pool: Executor) -> str | None:
 
 
 def _identity(client: Any) -> Any:
-    """Description of the scheduler of Dask and its workers; an error after :data:`PULSE` seconds."""
+    """Description of the scheduler of Dask without its workers; an error after :data:`PULSE` seconds."""
     if client.status not in ("running", "connecting"):
         raise RuntimeError(f"the client of Dask is {client.status}")
-    return client.sync(client.scheduler.identity, callback_timeout=PULSE)
+    return client.sync(client.scheduler.identity, n_workers=0, callback_timeout=PULSE)
 
 
 def _dask(pool: Executor) -> Any:

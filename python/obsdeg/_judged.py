@@ -11,7 +11,7 @@ from typing import Any
 
 import obsdeg
 
-from ._asked import digest, key, written
+from ._asked import digest, key, key_of, written
 from ._files import place
 from ._work import INPUT
 from .options import Analyze, Simulate
@@ -112,23 +112,32 @@ def parquet(rows: list[dict[str, Any]], columns: list[str]) -> bytes:
 
 @dataclass(frozen=True)
 class Judged:
-    """Result of a chunk: seconds, name of its file, its bytes if the worker does not see the folder, and
-    errors with the index of their task."""
+    """Result of a chunk: seconds, name of its file, its bytes if the worker does not see the folder, errors
+    with the index of their task, and number of tasks that were judged."""
 
     seconds: float
     name: str | None
     table: bytes | None
     wrong: list[tuple[int, Exception]]
+    count: int
 
 
-def judge(chunk: tuple[list[dict[str, Any]], str | None], *, columns: list[str], record: bool) -> Judged:
+#: Tasks, the folder for their file if the worker may see it, and the seconds after which no other task begins.
+Chunk = tuple[list[dict[str, Any]], "str | None", "float | None"]
+
+
+def judge(chunk: Chunk, *, columns: list[str], record: bool) -> Judged:
     """Judges the tasks of a chunk, and writes the file with their rows into a folder if one is given."""
-    tasks, stage = chunk
+    tasks, stage, limit = chunk
     start = time.perf_counter()
     rows: list[dict[str, Any]] = []
     keys: list[str] = []
     wrong: list[tuple[int, Exception]] = []
+    count = 0
     for i, task in enumerate(tasks):
+        if limit is not None and i > 0 and time.perf_counter() - start >= limit:
+            break
+        count += 1
         try:
             found = _rows(task)
         except (MemoryError, OSError, KeyboardInterrupt, SystemExit):
@@ -144,12 +153,12 @@ def judge(chunk: tuple[list[dict[str, Any]], str | None], *, columns: list[str],
         rows += found
         keys.append(key(task).hex())
     if not rows:
-        return Judged(time.perf_counter() - start, None, None, wrong)
+        return Judged(time.perf_counter() - start, None, None, wrong, count)
     name, table = f"{digest(keys)}.parquet", parquet(rows, columns)
     if stage is not None and Path(stage).is_dir():
         place(Path(stage) / name, table)
-        return Judged(time.perf_counter() - start, name, None, wrong)
-    return Judged(time.perf_counter() - start, name, table, wrong)
+        return Judged(time.perf_counter() - start, name, None, wrong, count)
+    return Judged(time.perf_counter() - start, name, table, wrong, count)
 
 
 def done(folder: Path) -> set[bytes]:
@@ -168,5 +177,5 @@ def done(folder: Path) -> set[bytes]:
         except pyarrow.ArrowInvalid as e:
             advice = "remove it, and its tasks are asked again"
             raise ValueError(f"{file}: found what is no Parquet file ({e}); {advice}") from None
-        there.update(key(json.loads(task)) for task in tasks)
+        there.update(map(key_of, tasks))
     return there

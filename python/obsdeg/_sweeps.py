@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
 from itertools import islice
@@ -17,6 +17,7 @@ from ._work import INPUT
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
 
 #: Number of tasks that a thread or worker takes at a time.
 _CHUNK = 20
@@ -57,9 +58,8 @@ def table(
     -------
     pandas.DataFrame
         Columns: ``task`` (number of the task, from 0), the tags, the options that are numbers or texts,
-            ``rank``, ``name``, ``status``,
-        ``degree``; with simulated runs ``sigma`` in ``unit`` and ``outcome``; ``error`` for tasks with an
-        error. ``table.set_index([...]).to_xarray()`` converts it to a data set of xarray.
+        ``rank``, ``name``, ``status``, ``degree``; with simulated runs ``sigma`` in ``unit`` and ``outcome``;
+        ``error`` for tasks with an error. :func:`to_xarray` converts it to a data set of xarray.
 
     Raises
     ------
@@ -125,6 +125,80 @@ def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
     return _frame(rows)
 
 
+def to_xarray(rows: pandas.DataFrame, dims: Sequence[str] | None = None) -> xarray.Dataset:
+    """Table of :func:`table` or :func:`read` as a data set of xarray (package ``xarray``).
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Table of a sweep.
+    dims : sequence of str, optional
+        Tags and options that become dimensions, and that distinguish all tasks; by default those with more
+        than one value.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``rank`` along ``dims``; ``status``, ``degree`` and, of simulated runs, ``sigma``, ``unit`` and
+        ``outcome`` along ``dims`` and ``name``; ``error`` along ``dims`` if there is one. Tasks that are not
+        in the table or have an error have missing values.
+
+    Raises
+    ------
+    ValueError
+        Two tasks have the same values of ``dims``, or a task has none.
+    ImportError
+        xarray is not installed.
+
+    Examples
+    --------
+    >>> from obsdeg import campaign
+    >>> pair = [(0, 0, 0), (180, 0, 0)]
+    >>> tasks = [dict(angles=[*pair, (x, 0, 0)], latitude=at, tags={"x": x}) for x in (0, 30) for at in (0, 45)]
+    >>> data = campaign.to_xarray(campaign.table(tasks))
+    >>> dict(data.sizes)
+    {'x': 2, 'latitude': 2, 'name': 15}
+    >>> data["rank"].sel(latitude=45).to_series().to_dict()
+    {0: 8.0, 30: 12.0}
+    """
+    try:
+        import xarray
+    except ModuleNotFoundError:
+        message = "a data set is made with the package `xarray`, which is not installed: pip install xarray"
+        raise ImportError(message) from None
+    asked = [str(name) for name in rows.columns if name not in ("task", *FOUND)]
+    tasks = rows.groupby("task").first()
+    if dims is None:
+        dims = [name for name in asked if tasks[name].nunique() > 1]
+    if unknown := [name for name in dims if name not in asked]:
+        raise ValueError(f"dims: found {unknown[0]!r}; expected some of {', '.join(asked)}")
+    if not dims:
+        raise ValueError("dims: found no tag or option with more than one value; expected one")
+    if (missing := tasks[list(dims)].isna().any(axis=1)).any():
+        found = f"task {missing.idxmax()} without a value of {', '.join(dims)}"
+        raise ValueError(f"dims: found {found}; expected one of each")
+    if (double := tasks.duplicated(list(dims), keep=False)).any():
+        same = " and ".join(map(str, tasks.index[double][:2]))
+        raise ValueError(f"dims: found tasks {same} with the same {', '.join(dims)}; expected different ones")
+    judged = rows[rows["name"].notna()]
+    of_tasks = tasks[[name for name in ("rank", "error") if name in rows]].astype({"rank": "float64"})
+    of_tasks.index = _index(tasks, dims)
+    kinds = [name for name in ("status", "degree", "sigma", "unit", "outcome") if name in rows]
+    of_unknowns = judged[kinds].astype({name: "float64" for name in ("degree", "sigma") if name in kinds})
+    of_unknowns.index = _index(judged, [*dims, "name"])
+    data = xarray.merge([of_tasks.to_xarray(), of_unknowns.to_xarray()], join="outer")
+    # texts in the order of the table, numbers by size
+    texts = [name for name in (*dims, "name") if data[name].dtype.kind not in "iufb"]
+    ordered: xarray.Dataset = data.sel({name: list(rows[name].dropna().unique()) for name in texts})
+    return ordered
+
+
+def _index(frame: pandas.DataFrame, names: Sequence[str]) -> pandas.Index:
+    import pandas
+
+    return pandas.MultiIndex.from_frame(frame[list(names)]) if len(names) > 1 else pandas.Index(frame[names[0]])
+
+
 def _chunks(tasks: Iterable[Mapping[str, Any]]) -> Iterator[list[tuple[int, Any]]]:
     left = enumerate(tasks)
     while chunk := list(islice(left, _CHUNK)):
@@ -137,7 +211,7 @@ def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, li
     for number, given in chunk:
         asked = _asked(number, stand_in(given, number))
         try:
-            task = checked(given, number, COLUMNS)
+            task, _ = checked(given, number, COLUMNS)
             asked = _asked(number, task)
             rows = judged_rows(task)
         except INPUT as problem:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from pickle import PicklingError
+from queue import Empty, SimpleQueue
 from typing import Any
 
 from ._executors import PULSE, Executors, close, unguarded, unreachable, workers_of
@@ -56,6 +57,11 @@ class _Tried:
     losses: int = 0
 
 
+def _is_lost(future: Future[Any]) -> bool:
+    """True if the executor of a finished future broke."""
+    return future.cancelled() or isinstance(future.exception(), (BrokenExecutor, CancelledError))
+
+
 class Work:
     """Tasks on their way through executors.
 
@@ -87,7 +93,14 @@ class Work:
         self.pending: deque[_Tried] = deque()
         self.suspects: deque[_Tried] = deque()
         self.waiting: dict[Future[Any], _Tried] = {}
+        # a wait for all futures would need time for each of them whenever one ends
+        self._ended: SimpleQueue[Future[Any]] = SimpleQueue()
         self._counted = (-COUNTED, 0)
+
+    @property
+    def workers(self) -> int:
+        """Number of workers at the last count."""
+        return self._counted[1]
 
     def open(self) -> list[Any]:
         """Drawn tasks that have not ended."""
@@ -111,9 +124,11 @@ class Work:
                         broken = refused
                 if not self.waiting and broken is None:
                     return
-                if broken is None:
-                    self._heard(pool)
-                for future in [f for f in self.waiting if f.done()]:
+                heard = self._heard(pool) if broken is None else []
+                if broken is not None or any(map(_is_lost, heard)):
+                    # results are read before the rest counts as lost
+                    heard = [f for f in self.waiting if f.done()]
+                for future in heard:
                     end = self._taken(future)
                     if isinstance(end, Ended):
                         yield end
@@ -160,6 +175,7 @@ class Work:
                 return
             else:
                 self.waiting[future] = self.pending.popleft()
+                future.add_done_callback(self._ended.put)
 
     def _alone(self) -> bool:
         """True if a suspect is the only task handed out."""
@@ -174,14 +190,21 @@ class Work:
             self._counted = (time.monotonic(), workers)
         return max(8, 2 * workers)
 
-    def _heard(self, pool: Executor) -> None:
-        """Waits until a task ends.
+    def _heard(self, pool: Executor) -> list[Future[Any]]:
+        """Waits until a task ends. Returns the futures that ended.
 
         Raises:
             CampaignError: the cluster does not answer.
         """
         silent_since: float | None = None
-        while not wait(self.waiting, timeout=PULSE, return_when=FIRST_COMPLETED).done:
+        while True:
+            news = self._news()
+            heard = [f for f in news if f in self.waiting]
+            if heard:
+                return heard
+            if news:
+                # futures of an executor that broke
+                continue
             began = time.monotonic()
             why = unreachable(pool)
             if why is None:
@@ -190,6 +213,16 @@ class Work:
             silent_since = began if silent_since is None else silent_since
             if time.monotonic() - silent_since >= PATIENCE:
                 raise self._without_workers(why)
+
+    def _news(self) -> list[Future[Any]]:
+        """Futures that ended since the last call; waits at most :data:`PULSE` seconds for the first."""
+        news = []
+        try:
+            news.append(self._ended.get(timeout=PULSE))
+            while True:
+                news.append(self._ended.get_nowait())
+        except Empty:
+            return news
 
     def _taken(self, future: Future[Any]) -> Ended | BaseException | None:
         """Outcome of a finished future: end of its task, error of a broken executor, or None if the task is
@@ -202,7 +235,7 @@ class Work:
         if error is None:
             del self.waiting[future]
             return Ended(tried.task, future.result())
-        if isinstance(error, (BrokenExecutor, CancelledError)):
+        if _is_lost(future):
             # the task stays in `waiting`, since the other futures are read first
             return error
         del self.waiting[future]

@@ -27,23 +27,28 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from itertools import chain, islice, product
+from math import prod
+from operator import length_hint
 from pathlib import Path
 from typing import Any, Literal
 
 import obsdeg
 
-from ._asked import checked, digest, key, stand_in
+from ._asked import checked, digest, key, key_of, stand_in
 from ._executors import Executors, RayExecutor, check_main, processes
 from ._files import place
-from ._judged import COLUMNS, FOUND, WHAT, Judged, judge, name_of, parquet, row_of
+from ._judged import COLUMNS, FOUND, WHAT, Chunk, Judged, judge, name_of, parquet, row_of
 from ._judged import done as there_in
-from ._sweeps import read, table, threads
+from ._sweeps import read, table, threads, to_xarray
 from ._work import END, INPUT, CampaignError, Ended, Work
 
-__all__ = ["CampaignError", "Executors", "RayExecutor", "design", "grid", "processes", "read", "run", "sweep", "table", "threads"]
+__all__ = ["CampaignError", "Executors", "RayExecutor"]
+__all__ += ["design", "grid", "processes", "read", "run", "sweep", "table", "threads", "to_xarray"]
 
 #: Seconds of work per file of a sweep, if the size of chunks follows the measured time.
 FILE_SECONDS = 10.0
+#: Number of workers above which a file has more work, so that about ten files end in a second.
+MANY = 100
 #: Largest number of tasks in such a file.
 FILE_TASKS = 5000
 #: Number of first tasks whose options are columns of every file; options of later tasks add columns to their
@@ -206,8 +211,23 @@ def grid(**axes: Iterable[Any]) -> Iterator[dict[str, Any]]:
     for name, values_of in axes.items():
         if isinstance(values_of, (str, bytes)):
             raise TypeError(f"{name}: found {values_of!r}; expected a list of values, as in [{values_of!r}]")
-    names, values = list(axes), [list(v) for v in axes.values()]
-    return (dict(zip(names, chosen, strict=True)) for chosen in product(*values))
+    return _Grid(axes)
+
+
+class _Grid(Iterator[dict[str, Any]]):
+    """Combinations of options, whose number is known."""
+
+    def __init__(self, axes: Mapping[str, Iterable[Any]]) -> None:
+        values = [list(v) for v in axes.values()]
+        self._names, self._rest, self._left = list(axes), product(*values), prod(map(len, values))
+
+    def __next__(self) -> dict[str, Any]:
+        chosen = next(self._rest)
+        self._left -= 1
+        return dict(zip(self._names, chosen, strict=True))
+
+    def __length_hint__(self) -> int:
+        return self._left
 
 
 @contextmanager
@@ -250,20 +270,41 @@ def _locked(folder: Path) -> int | None:
 
 
 class _Chunks:
-    """Number of tasks per file: fixed, or that of :data:`FILE_SECONDS` by the measured time of earlier ones.
+    """Number of tasks per file: fixed, or that of some seconds by the measured time of earlier ones.
+
+    Args:
+        fixed: number of tasks; None follows the time.
+        tasks: number of all tasks; 0 if it is not known. Towards their end files have less work, so that all
+            workers end at about the same time.
     """
 
-    def __init__(self, fixed: int | None) -> None:
-        self.fixed, self.seconds, self.size = fixed, 0.0, 1
+    def __init__(self, fixed: int | None, tasks: int) -> None:
+        self.fixed, self.tasks, self.drawn = fixed, tasks, 0
+        self.each, self.size = 0.0, 1
 
-    def next(self) -> int:
-        return self.fixed if self.fixed is not None else self.size
+    def next(self, workers: int) -> int:
+        """Number of tasks of the next chunk."""
+        if self.fixed is not None:
+            return self.fixed
+        if self.tasks == 0:
+            return self.size
+        # each worker has a chunk at work and one that waits
+        fair = (self.tasks - self.drawn) // (2 * max(1, workers))
+        return max(1, min(self.size, max(fair, self.size // 30)))
 
-    def took(self, seconds: float, tasks: int) -> None:
+    def limit(self, workers: int) -> float | None:
+        """Seconds after which a chunk ends before its last task; None for a fixed number of tasks."""
+        return 2 * self._seconds(workers) if self.fixed is None else None
+
+    def took(self, seconds: float, tasks: int, workers: int) -> None:
+        """Counts the time of a chunk."""
         each = seconds / tasks
-        self.seconds = each if self.seconds == 0 else 0.7 * self.seconds + 0.3 * each
+        self.each = each if self.each == 0 else 0.7 * self.each + 0.3 * each
         # at most four times as many: the first tasks may be the easy ones
-        self.size = max(1, min(FILE_TASKS, 4 * self.size, int(FILE_SECONDS / max(self.seconds, 1e-6))))
+        self.size = max(1, min(FILE_TASKS, 4 * self.size, int(self._seconds(workers) / max(self.each, 1e-6))))
+
+    def _seconds(self, workers: int) -> float:
+        return FILE_SECONDS * max(1.0, workers / MANY)
 
 
 def sweep(
@@ -292,7 +333,10 @@ def sweep(
             :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated
             too: ``sigma`` is the standard deviation at the end of the run in ``unit``, and ``outcome`` tells
             if it comes from the samples. Without simulation these are empty.
-        chunk: number of tasks judged together; by default about 10 s of work, by measured time.
+        chunk: number of tasks judged together; by default about 10 s of work, by measured time, with more
+            than 100 workers as much as lets ten files end in a second. Chunks become smaller towards the end
+            if the number of tasks is known: that of a list or of :func:`grid`, not that of a generator. A
+            chunk that takes twice the intended time ends early, and its other tasks are handed out again.
         retries: number of times that tasks of a lost worker are tried again. Then the chunk is divided until
             the responsible task is found.
         errors: a task that cannot be judged ends the sweep and is named (``"raise"``), or gets one row with
@@ -315,7 +359,8 @@ def sweep(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     with _alone(folder) as stage:
-        _sweep(folder, stage, tasks, _Chunks(chunk), executor, retries, errors == "record", heard)
+        chunks = _Chunks(chunk, length_hint(tasks))
+        _sweep(folder, stage, tasks, chunks, executor, retries, errors == "record", heard)
     return folder
 
 
@@ -333,6 +378,7 @@ def _sweep(
     done, told = 0, 0
     seen_by_workers = True
     again: deque[list[dict[str, Any]]] = deque()
+    returned: deque[dict[str, Any]] = deque()
     rest = iter(tasks)
     first = list(islice(rest, FIRST))
     named = [name for task in first if isinstance(task, Mapping) for name in task if isinstance(name, str)]
@@ -351,11 +397,13 @@ def _sweep(
         nonlocal done
         for number, given in enumerate(chain(first, rest)):
             error: Exception | None = None
+            chunks.drawn += 1
             try:
-                task = checked(given, number, COLUMNS)
+                task, text = checked(given, number, COLUMNS)
+                by_value = key_of(text)
             except (TypeError, ValueError) as e:
                 task, error = stand_in(given, number), e
-            by_value = key(task)
+                by_value = key(task)
             if by_value in there:
                 done += 1
                 continue
@@ -369,8 +417,12 @@ def _sweep(
     fresh = missing()
 
     def draw() -> Any:
-        some = again.popleft() if again else list(islice(fresh, chunks.next()))
-        return (some, str(stage) if seen_by_workers else None) if some else END
+        if again:
+            some = again.popleft()
+        else:
+            count = chunks.next(work.workers)
+            some = [returned.popleft() for _ in range(min(count, len(returned)))] or list(islice(fresh, count))
+        return (some, str(stage) if seen_by_workers else None, chunks.limit(work.workers)) if some else END
 
     work = Work(partial(judge, columns=columns, record=record), draw, executor, retries, None, divide=_halves)
     for end in work.ended():
@@ -383,10 +435,12 @@ def _sweep(
                 seen_by_workers = False
                 again.append(some)
                 continue
-            chunks.took(judged.seconds, len(some))
+            chunks.took(judged.seconds, judged.count, work.workers)
+            returned.extendleft(reversed(some[judged.count :]))
             if judged.wrong and not record:
                 i, error = judged.wrong[0]
                 wrong(Ended(some[i], error=error), some[i])
+            some = some[: judged.count]
         done += len(some)
         told = done
         if heard is not None:
@@ -395,11 +449,11 @@ def _sweep(
         heard(done)
 
 
-def _halves(chunk: tuple[list[dict[str, Any]], str | None]) -> list[Any]:
+def _halves(chunk: Chunk) -> list[Chunk]:
     """The two halves of a chunk that failed too often; empty for a single task."""
-    tasks, stage = chunk
+    tasks, stage, limit = chunk
     half = len(tasks) // 2
-    return [(tasks[:half], stage), (tasks[half:], stage)] if half else []
+    return [(tasks[:half], stage, limit), (tasks[half:], stage, limit)] if half else []
 
 
 def _published(judged: Judged, stage: Path, folder: Path) -> bool:

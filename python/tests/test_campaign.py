@@ -254,6 +254,35 @@ def test_a_sweep_goes_on_with_other_chunks_and_orders(tmp_path: Path) -> None:
     assert len(rows) == 6 * 15 and rows["task"].nunique() == 6
 
 
+def test_the_rest_of_a_chunk_that_takes_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chunk ends at its limit, and its other tasks are handed out again."""
+    pandas = pytest.importorskip("pandas")
+    from obsdeg import _judged
+
+    counts: list[tuple[int, int]] = []
+
+    def slowly(task: dict[str, Any]) -> list[dict[str, Any]]:
+        time.sleep(0.02 if task["latitude"] >= 40 else 0.001)
+        return [{"task": _judged.name_of(task), **dict.fromkeys(_judged.FOUND), "rank": 1, "name": "x"}]
+
+    def judge(*args: Any, **options: Any) -> Any:
+        judged = _judged.judge(*args, **options)
+        counts.append((len(args[0][0]), judged.count))
+        return judged
+
+    monkeypatch.setattr(campaign, "FILE_SECONDS", 0.03)
+    monkeypatch.setattr(_judged, "_rows", slowly)
+    monkeypatch.setattr(campaign, "judge", judge)
+    tasks = ({"angles": PAIR, "latitude": i} for i in range(80))
+    heard: list[int] = []
+    campaign.sweep(tmp_path, tasks, executor=lambda: ThreadPoolExecutor(1), heard=heard.append)
+    assert any(count < given for given, count in counts) and sum(count for _, count in counts) == 80
+    # no task begins after twice the time
+    assert all(count <= 4 for given, count in counts[-8:]) and heard[-1] == 80
+    rows = pandas.read_parquet(tmp_path)
+    assert len(rows) == 80 and rows["task"].nunique() == 80
+
+
 def test_options_of_some_tasks_and_schemes(tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     pair = [(0, 0, 0), (180, 0, 0)]

@@ -331,7 +331,7 @@ class Silent(Executor):
         scheduler = type("Scheduler", (), {"identity": None})
         nthreads = None
 
-        def sync(self, ask: Any, callback_timeout: float) -> Any:
+        def sync(self, ask: Any, **options: Any) -> Any:
             raise TimeoutError
 
     def __init__(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from decimal import Decimal
 from pathlib import Path
@@ -81,10 +82,50 @@ def test_a_folder_is_read_as_the_same_table(tmp_path: Path) -> None:
     assert {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.parquet")} == files
 
 
-def test_a_table_by_processes_and_as_xarray() -> None:
+def test_a_table_by_processes() -> None:
     tasks = [dict(angles=[*PAIR, (x, 0, 0)], latitude=lat, tags={"x": x}) for x in (0, 30) for lat in (0, 45)]
     rows = campaign.table(tasks)
     assert campaign.table(tasks, executor=campaign.processes).equals(rows)
+
+
+def test_a_data_set_of_xarray() -> None:
     xarray = pytest.importorskip("xarray", reason="xarray is not installed")
-    data = rows.set_index(["x", "latitude", "name"])[["rank"]].astype(int).to_xarray()
-    assert isinstance(data, xarray.Dataset) and data["rank"].sel(x=30, latitude=45, name="D_FX") == rows["rank"].iloc[-1]
+    tasks: list[dict[str, Any]] = [
+        dict(angles=[*PAIR, (x, 0, 0)], latitude=at, tags={"x": x, "side": side}) for side in ("west", "east") for x in (30, 0) for at in (0, 45, 95)
+    ]
+    rows = campaign.table(tasks)
+    data = campaign.to_xarray(rows)
+    assert isinstance(data, xarray.Dataset) and dict(data.sizes) == {"x": 2, "side": 2, "latitude": 3, "name": 15}
+    assert set(data.data_vars) == {"rank", "status", "degree", "error"}
+    assert data["rank"].dims == data["error"].dims == ("x", "side", "latitude")
+    # numbers by size, texts and unknowns in the order of the table
+    assert data["x"].values.tolist() == [0, 30] and data["side"].values.tolist() == ["west", "east"]
+    assert data["name"].values.tolist() == rows["name"].dropna().unique().tolist()
+    # a task with an error has missing values and its message
+    assert all(data[name].sel(latitude=95).isnull().all() for name in ("rank", "status", "degree"))
+    assert data["error"].sel(latitude=[0, 45]).isnull().all()
+    assert "95 is out of range" in data["error"].sel(x=0, side="east", latitude=95).item()
+    for row in rows[rows["error"].isna()].itertuples():
+        cell = data.sel(x=row.x, side=row.side, latitude=row.latitude, name=row.name)
+        assert cell["status"].item() == row.status and cell["rank"].item() == row.rank
+        assert cell["degree"].item() == row.degree if row.degree is not pandas.NA else numpy.isnan(cell["degree"].item())
+    west = rows[(rows["side"] == "west") & (rows["x"] == 0)]
+    assert campaign.to_xarray(west)["status"].dims == ("latitude", "name")
+
+
+def test_a_data_set_needs_dimensions_that_tell_tasks_apart() -> None:
+    pytest.importorskip("xarray", reason="xarray is not installed")
+    tasks: list[dict[str, Any]] = [dict(angles=PAIR, latitude=at, tags={"x": x}) for x in (1, 2) for at in (0, 45)]
+    rows = campaign.table([*tasks, dict(angles=PAIR, latitude=10)])
+    messages = {"x": "task 4 without a value of x", "y": "'y'; expected some of x, latitude", "latitude": "tasks 0 and 2 with the same latitude"}
+    for dims, message in messages.items():
+        with pytest.raises(ValueError, match=f"dims: found {message}"):
+            campaign.to_xarray(rows, [dims])
+    with pytest.raises(ValueError, match="no tag or option with more than one value"):
+        campaign.to_xarray(rows[rows["task"] == 0])
+
+
+def test_without_xarray_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ImportError, match="package `xarray`, which is not installed"):
+        campaign.to_xarray(pandas.DataFrame())
