@@ -406,17 +406,22 @@ fn generic_angles(scheme: &Scheme) -> Option<Scheme> {
     Some(out)
 }
 
-/// Notes on ambiguities of the unknown terms, which hold whatever the verdicts are.
-pub fn term_notes(scheme: &Scheme) -> Vec<String> {
-    let terms = scheme.unknowns.terms();
-    let have = |all: &[Term]| all.iter().all(|t| terms.contains(t));
+/// True if the force along every input axis is -1, 0 or 1 g at all positions.
+fn is_cardinal(scheme: &Scheme) -> bool {
     let force = |p: &Position| -> Vec<f64> {
         let c = c_n_from_euler(&Float, &std::array::from_fn(|k| p.angles[k].turn().cos_sin_f64()));
         scheme.geometry.accelerometers.inputs().iter().map(|a| c[1][a.axis]).collect()
     };
     let whole = |x: &f64| x.abs() < 1e-15 || (x.abs() - 1.0).abs() < 1e-15;
     let stands = |p: &Position| p.rotation.is_none() && p.angles.iter().all(|a| a.generic().is_none());
-    let cardinal = scheme.positions.iter().all(|p| stands(p) && force(p).iter().all(whole));
+    scheme.positions.iter().all(|p| stands(p) && force(p).iter().all(whole))
+}
+
+/// Notes on ambiguities of the unknown terms, which hold whatever the verdicts are.
+pub fn term_notes(scheme: &Scheme) -> Vec<String> {
+    let terms = scheme.unknowns.terms();
+    let have = |all: &[Term]| all.iter().all(|t| terms.contains(t));
+    let cardinal = is_cardinal(scheme);
     let mut out = Vec::new();
     let mut say = |holds: bool, text: &str| out.extend(holds.then(|| text.to_string()));
     say(
