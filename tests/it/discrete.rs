@@ -7,8 +7,6 @@ use obsdeg_core::system::{
 };
 use obsdeg_exact::SplitMix64;
 
-use crate::program::obsdeg;
-
 fn analyzed(text: &str) -> SystemAnalysis {
     let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
     analyze_system(&model, SystemOptions::default()).unwrap_or_else(|e| panic!("{e}: {text}"))
@@ -307,15 +305,14 @@ fn refusals() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.toml");
     std::fs::write(&path, model(&[("x", "a*x")], &[("y", "x")], &["a"], "")).expect("a file");
+    let run = |command: &str| crate::program::run(&[command, "--model", path.to_str().expect("a path")]);
     for command in ["simulate", "crosscheck"] {
-        let mut run = obsdeg();
-        let out = run.arg(command).arg("--model").arg(&path).output().expect("the program");
+        let out = run(command);
         let said = String::from_utf8_lossy(&out.stderr).into_owned();
         assert_eq!(out.status.code(), Some(2), "{said}");
         assert!(said.contains("discrete time") && said.contains("analyze"), "{command}: {said}");
     }
-    let mut run = obsdeg();
-    let out = run.arg("analyze").arg("--model").arg(&path).output().expect("the program");
+    let out = run("analyze");
     let said = String::from_utf8_lossy(&out.stdout).into_owned();
     assert!(
         out.status.success() && said.contains("x[t+1] = a*x") && said.contains("discrete time"),

@@ -342,7 +342,7 @@ impl Algebra {
         let points = bound + scale.len();
         let terms = TERM * (a.len() + b.len()) as u64;
         let each = dense.saturating_add(terms);
-        let (at, values) = self.images([&a, &b], &scale, (points, each), others)?;
+        let (at, values) = self.images_along([&a, &b], &scale, (points, each), others)?;
         let mut parts = BTreeMap::new();
         let mut own = Vec::new();
         for (m, mut list) in values {
@@ -381,7 +381,7 @@ impl Algebra {
 
     /// Greatest common divisors at as many `points` of a variable, each for `work` products, with the leading
     /// coefficient `scale`: the points, and the values of each coefficient at those where it is not zero.
-    fn images(
+    fn images_along(
         &mut self,
         both: [&BTreeMap<Lex, Vec<u64>>; 2],
         scale: &[u64],

@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableCell, TableStyle};
+use comfy_table::{Cell, CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
-use crate::document::{Document, DocumentBlock, TableColumn};
+use crate::document::{Document, DocumentBlock, TableCell, TableColumn};
 use crate::{TerminalLayout, visible};
 
 /// Table with one line under the header and no other.
@@ -55,12 +55,7 @@ fn wrapped(text: &str, layout: TerminalLayout, first: &str, others: &str) -> Vec
     lines
 }
 
-fn table(
-    out: &mut String,
-    columns: &[TableColumn],
-    rows: &[Vec<crate::document::TableCell>],
-    layout: TerminalLayout,
-) {
+fn table(out: &mut String, columns: &[TableColumn], rows: &[Vec<TableCell>], layout: TerminalLayout) {
     let mut table = Table::new();
     table.load_style(STYLE).set_header(columns.iter().map(|c| visible(&c.name)));
     if let Some(width) = layout.width {
@@ -71,7 +66,7 @@ fn table(
             let side = if column.number { CellAlignment::Right } else { CellAlignment::Left };
             let graded = layout.color && GRADED.contains(&column.name.as_ref());
             let text = if graded { marked(&cell.text) } else { visible(&cell.text) };
-            TableCell::new(text).set_alignment(side)
+            Cell::new(text).set_alignment(side)
         });
         table.add_row(aligned);
     }

@@ -506,7 +506,8 @@ impl SystemModel {
     /// never defined.
     pub fn compile(&self) -> Result<Compiled, ModelError> {
         if self.discrete {
-            let message = "in discrete time; expected a model in continuous time (`analyze` judges both)".into();
+            let message =
+                "in discrete time; expected a model in continuous time (`analyze` judges both)".into();
             return Err(ModelError { what: "the model".into(), message, span: None });
         }
         self.check()?;

@@ -324,7 +324,7 @@ impl Evaluator {
     }
 
     /// Row in SI units rearranged as by [`Self::ordered_columns`], with entries of any number type.
-    pub(crate) fn in_order<X: Copy + Mul<f64, ObservedComponent = X>>(&self, row: &[X]) -> Vec<X> {
+    pub(crate) fn in_order<X: Copy + Mul<f64, Output = X>>(&self, row: &[X]) -> Vec<X> {
         self.order.iter().zip(&self.scale).filter_map(|(&c, scale)| Some(*row.get(c)? * *scale)).collect()
     }
 

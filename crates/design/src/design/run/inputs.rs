@@ -243,7 +243,7 @@ fn of_conditions(conditions: &Conditions) -> String {
     ];
     // parts of searches of before know no such time
     let settle = (*settle_s > 0.0).then_some(("settle", settle_s as &dyn Debug));
-    text(&of) + &text(settle.as_slice())
+    text(&of) + text(settle.as_slice()).as_str()
 }
 
 /// Text `simulation.dwell_s is 999.0, here 1000.0`: inputs that differ; long values are left out.
