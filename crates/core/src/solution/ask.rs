@@ -156,7 +156,7 @@ pub(crate) fn dynamics_text(
     }
 }
 
-fn radical_text(r: &Radical) -> String {
+pub(super) fn radical_text(r: &Radical) -> String {
     r.to_string().replace("sqrt(6)", "r_2*r_3").replace("sqrt(2)", "r_2").replace("sqrt(3)", "r_3")
 }
 

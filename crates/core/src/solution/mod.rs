@@ -1,6 +1,8 @@
 //! Solutions of observable quantities in derivatives of Z.
 
+mod angle_products;
 pub(crate) mod ask;
+mod closed_form;
 pub(crate) mod combinations;
 pub(crate) mod formulas;
 mod half_tangent;

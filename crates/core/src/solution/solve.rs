@@ -26,7 +26,8 @@ const RESIDUAL: f64 = 1e-9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FoundBy {
-    /// Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images in two prime fields.
+    /// Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6`, and these times short products of sines and cosines,
+    /// recovered from their images in two prime fields.
     PrimeFields,
     /// Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are the
     /// same.
@@ -258,7 +259,8 @@ impl Solver<'_> {
         self.split_rates(&y.collect::<Option<Vec<_>>>()?)
     }
 
-    /// Numbers of the printed terms: roots if possible, or formulas of the engine, or decimals.
+    /// Numbers of the printed terms: roots if possible, or formulas of the engine, or short products of sines
+    /// and cosines, or decimals.
     fn numbers(
         &mut self,
         functional: &Functional,
@@ -281,6 +283,11 @@ impl Solver<'_> {
             return Ok((exact, FoundBy::PrimeFields, Verification::Modular));
         }
         let Some(texts) = self.ask_for_solution(functional, system, used, plan) else {
+            let closed: Option<Vec<Number>> =
+                (0..plan.len()).map(|i| self.closed_form(&of_term(i))).collect();
+            if let Some(numbers) = closed {
+                return Ok((numbers, FoundBy::PrimeFields, Verification::Modular));
+            }
             let missing = match &self.worker {
                 None => Unsolved::NoEngine,
                 Some(_) if self.too_many_angles() => Unsolved::TooManyAngles,

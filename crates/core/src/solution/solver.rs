@@ -8,6 +8,7 @@ use obsdeg_symbolic::Worker;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::angle_products::AngleProduct;
 use super::problem::LinearSystem;
 use super::turning::motion_rows;
 use crate::degree::coefficient::{
@@ -64,6 +65,8 @@ pub struct Solver<'a> {
     pub(super) text_point: PlatformPoint<Text>,
     pub(super) floats: Option<(PlatformPoint<Float>, Vec<Vec<f64>>)>,
     many_digits: OnceCell<Option<Vec<Vec<Real>>>>,
+    /// Short products of sines and cosines, computed at the first request.
+    pub(super) products: OnceCell<Vec<AngleProduct>>,
     pub(super) worker: Option<&'a mut Worker>,
     pub(super) frame: Frame,
     /// Position of every station, and its axis if the platform turns there.
@@ -103,7 +106,6 @@ impl<'a> Solver<'a> {
             });
         let stations = platform.scheme().stations();
         let stations = stations.iter().map(|s| (s.index, s.turned.as_ref().map(|t| t.axis))).collect();
-        let many_digits = OnceCell::new();
         Self {
             platform,
             verdicts,
@@ -112,7 +114,8 @@ impl<'a> Solver<'a> {
             text,
             text_point,
             floats,
-            many_digits,
+            many_digits: OnceCell::new(),
+            products: OnceCell::new(),
             worker,
             frame,
             stations,
@@ -287,6 +290,11 @@ impl<'a> Solver<'a> {
                 let pairs = texts.into_iter().zip(split);
                 return Some(pairs.map(|(raw, (_, numbers))| self.simplest(raw, numbers)).collect());
             }
+        }
+        let closed: Option<Vec<Number>> =
+            split.iter().map(|(_, numbers)| self.closed_form(numbers)).collect();
+        if closed.is_some() {
+            return closed;
         }
         if let Some(numbers) = self.many_digits().and_then(|rows| problem.solve_in_many_digits(rows)) {
             return Some(numbers.into_iter().map(Number::Decimal).collect());
