@@ -41,7 +41,8 @@ def gate(problem: Path) -> Gate:
     while left:
         fix.append(left[0])
         # a known constant of any value
-        model = model.replace(parameters=[name for name in parameters if name not in fix], constants={name: None for name in fix})
+        rest = [name for name in parameters if name not in fix]
+        model = model.replace(parameters=rest, constants=dict.fromkeys(fix, "generic"))
         statuses = obsdeg.analyze(model).statuses
         left = [name for name in left[1:] if statuses[name] != "observable"]
     return Gate(open_, fix, combine)
