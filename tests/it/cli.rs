@@ -67,8 +67,36 @@ fn solutions_of_the_fields_wait_for_no_engine() {
     assert_eq!(a["notes"], serde_json::json!([]));
 }
 
-/// Solutions with sines and cosines are printed with decimals if the engine is not available. A work limit of
-/// zero stops the engine before its first answer.
+/// A short product of sines and cosines needs no engine: the same coefficient as with it, recovered from its
+/// images in the prime fields.
+#[test]
+fn short_products_need_no_engine() {
+    let scheme = ["analyze", "--angles", "0,0,0", "--angles", "40,0,0", "--format", "json"];
+    let solution = |a: &Value, name: &str| {
+        let list = a["quantities"].as_array().expect("a list");
+        list.iter().find(|q| q["name"] == name).expect("it is there")["solution"].clone()
+    };
+    let without = json(&[&scheme[..], &["--symbolic-limit", "0"]].concat());
+    let with = json(&scheme);
+    let mut closed = 0;
+    for q in with["quantities"].as_array().expect("a list") {
+        let name = q["name"].as_str().expect("a name");
+        let (own, other) = (solution(&without, name), solution(&with, name));
+        if own["form"] == "symbolic" {
+            closed += 1;
+            assert_eq!(own["found_by"], "prime_fields", "{own}");
+            assert_eq!(own["verification"], "modular", "{own}");
+            assert!(own["text"].as_str().expect("a text").contains("(40 deg)"), "{own}");
+            if cfg!(feature = "symbolica") {
+                assert_eq!(other["form"], "symbolic", "{other}");
+            }
+        }
+    }
+    assert!(closed > 2, "{without}");
+}
+
+/// Solutions with sums of sines and cosines are printed with decimals if the engine is not available. A work
+/// limit of zero stops the engine before its first answer.
 #[test]
 fn without_the_engine_solutions_are_decimals_and_it_is_said() {
     let refused = json(&[&CONSTANT[..], &["--format", "json", "--symbolic-limit", "0"]].concat());
