@@ -3,14 +3,14 @@
 /// Margin between the numbers that counted as zero and those that did not, in rank decisions. Values
 /// are binary logarithms relative to the largest entry of the row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gap {
+pub struct RankMargin {
     /// Smallest number that did not count as zero.
     pub nonzero: f64,
     /// Largest radius of a number that counted as zero.
     pub zero: f64,
 }
 
-impl Gap {
+impl RankMargin {
     /// Margin before any decision.
     pub const OPEN: Self = Self { nonzero: 0.0, zero: f64::NEG_INFINITY };
 

@@ -55,7 +55,7 @@ pub mod turn;
 pub use ball::{Ball, BallSum};
 pub use echelon::Echelon;
 pub use field::Field;
-pub use gap::Gap;
+pub use gap::RankMargin;
 pub use gcd::gcd;
 pub use prime::{PrimeError, RootField};
 pub use radical::{Radical, Ratio};

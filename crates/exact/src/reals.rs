@@ -1,12 +1,12 @@
 //! Real numbers of `64 N` bits as a field, and row spaces over them.
 //!
 //! The error bound of a ball proves that a number is not zero. No computation proves that a number is
-//! zero: it counts as zero if its ball contains zero and is narrow, and the [`Gap`] is the margin
+//! zero: it counts as zero if its ball contains zero and is narrow, and the [`RankMargin`] is the margin
 //! between the two kinds. If the margin is small nothing is decided, and the caller takes more digits.
 
 use std::cell::Cell;
 
-use crate::{Ball, BallSum, Gap, RowSpace, Scalars, interrupt};
+use crate::{Ball, BallSum, RankMargin, RowSpace, Scalars, interrupt};
 
 /// Largest numerator and denominator that [`Scalars::rational`] accepts.
 const SMALL: i64 = 1 << 20;
@@ -124,7 +124,7 @@ pub struct RealSpace<const N: usize> {
     weights: Vec<Vec<Ball<N>>>,
     pivots: Vec<usize>,
     row_of: Vec<Option<usize>>,
-    gap: Cell<Gap>,
+    gap: Cell<RankMargin>,
     /// Number of products that [`refine`](Self::refine) took.
     refined: u64,
 }
@@ -145,9 +145,9 @@ impl<const N: usize> RealSpace<N> {
         let gap = self.gap.get();
         let zero = entry.is_zero();
         self.gap.set(if zero {
-            Gap { zero: gap.zero.max(entry.radius_log2() - scale), ..gap }
+            RankMargin { zero: gap.zero.max(entry.radius_log2() - scale), ..gap }
         } else {
-            Gap { nonzero: gap.nonzero.min(entry.size_log2() - scale), ..gap }
+            RankMargin { nonzero: gap.nonzero.min(entry.size_log2() - scale), ..gap }
         });
         !zero
     }
@@ -249,7 +249,7 @@ impl<const N: usize> RowSpace for RealSpace<N> {
             weights: Vec::new(),
             pivots: Vec::new(),
             row_of: vec![None; columns],
-            gap: Cell::new(Gap::OPEN),
+            gap: Cell::new(RankMargin::OPEN),
             refined: 0,
         }
     }
@@ -353,7 +353,7 @@ impl<const N: usize> RowSpace for RealSpace<N> {
         .collect()
     }
 
-    fn gap(&self) -> Gap {
+    fn gap(&self) -> RankMargin {
         self.gap.get()
     }
 
@@ -475,12 +475,12 @@ mod tests {
         // proven not to be zero, and nothing else is small
         assert_eq!(rank(one.shifted(-200)), (true, true));
         // a quarter of the bits above the level of zeros, or less
-        let gap = |nonzero: f64| Gap { nonzero, zero: -130.0 }.is_decisive(256);
+        let gap = |nonzero: f64| RankMargin { nonzero, zero: -130.0 }.is_decisive(256);
         assert!(gap(-65.0) && !gap(-67.0));
         // contains zero: clear if it is narrow
         assert_eq!(rank(Real::ZERO.widened(-200.0)), (false, true));
         assert_eq!(rank(Real::ZERO.widened(-100.0)), (false, false));
-        assert!(Gap { nonzero: -3.0, zero: -9.0 }.and(Gap::OPEN).zero == -9.0);
+        assert!(RankMargin { nonzero: -3.0, zero: -9.0 }.and(RankMargin::OPEN).zero == -9.0);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use crate::{Echelon, Field, Gap, Ratio};
+use crate::{Echelon, Field, RankMargin, Ratio};
 
 /// Field whose elements a series or a row space contains.
 pub trait Scalars: Clone + Debug {
@@ -89,8 +89,8 @@ pub trait RowSpace: Clone + Debug {
     /// ([`Echelon::companions`]).
     fn companions(&self) -> Vec<Vec<usize>>;
     /// Margin of the decisions; exact fields have none.
-    fn gap(&self) -> Gap {
-        Gap::OPEN
+    fn gap(&self) -> RankMargin {
+        RankMargin::OPEN
     }
     /// Number of products so far beyond those of an elimination, for rows recomputed because of wide
     /// errors.

@@ -38,4 +38,4 @@ pub mod protocol;
 pub mod worker;
 
 pub use client::{Waiting, Worker, WorkerConfig, WorkerError};
-pub use protocol::{Check, Dynamics, Job, Order, Request, Response, System};
+pub use protocol::{Dynamics, Job, Order, Request, Response, SubstitutionCheck, System};

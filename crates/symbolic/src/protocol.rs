@@ -43,7 +43,7 @@ pub enum Job {
         /// Linear system to solve.
         system: System,
         /// Check of the solution against the dynamics; `None` for no check.
-        check: Option<Check>,
+        check: Option<SubstitutionCheck>,
     },
     /// Differentiate the outputs along the dynamics up to `order`; answer output by output, order by
     /// order.
@@ -86,7 +86,7 @@ pub struct Dynamics {
 /// Claim `sum_i x_i sum_t factor_t (d/dt)^order_t z_output_t at segment_t = target`, to be verified by
 /// differentiating and substituting.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Check {
+pub struct SubstitutionCheck {
     /// Local system of every segment.
     pub dynamics: Dynamics,
     /// Names of the unknowns.
@@ -100,7 +100,7 @@ pub struct Check {
     pub target: Vec<(String, String)>,
 }
 
-/// One term of a [`Check`].
+/// One term of a [`SubstitutionCheck`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CheckTerm {
     /// Factor: a rational function of the symbols.

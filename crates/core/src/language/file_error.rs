@@ -243,7 +243,7 @@ mod tests {
     #[derive(Debug, Deserialize, JsonSchema)]
     #[serde(deny_unknown_fields)]
     #[allow(dead_code, reason = "what is read does not matter here")]
-    struct File {
+    struct ExampleFile {
         carry: String,
         #[serde(default)]
         step: f64,
@@ -260,8 +260,8 @@ mod tests {
     #[test]
     fn complaints_are_in_words_and_know_their_place() {
         let said = |text: &str| {
-            let e = toml::from_str::<File>(text).expect_err("wrong");
-            let (message, span) = explain::<File>(text, &e);
+            let e = toml::from_str::<ExampleFile>(text).expect_err("wrong");
+            let (message, span) = explain::<ExampleFile>(text, &e);
             (message, span.map(|s| text[s].to_string()))
         };
         let at = |text: &str, message: &str, place: &str| {

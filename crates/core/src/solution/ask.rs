@@ -1,7 +1,7 @@
 //! Requests of the solver to the symbolic worker.
 
 use obsdeg_exact::Radical;
-use obsdeg_symbolic::{Check, Dynamics, Job, Request, System, WorkerError, protocol::CheckTerm};
+use obsdeg_symbolic::{Dynamics, Job, Request, SubstitutionCheck, System, WorkerError, protocol::CheckTerm};
 
 use super::local::ZTerm;
 use super::problem::{LinearSystem, SystemOutputs};
@@ -14,7 +14,7 @@ use crate::model::ring::{Ring, Text};
 use crate::model::symbols::Symbols;
 
 impl Solver<'_> {
-    pub(super) fn request(&self, system: System, check: Option<Check>) -> Request {
+    pub(super) fn request(&self, system: System, check: Option<SubstitutionCheck>) -> Request {
         Request {
             symbols: self.symbols.independent(),
             generators: self.symbols.generators(),
@@ -79,7 +79,7 @@ impl Solver<'_> {
         self.ask(&request).filter(|(_, verified)| *verified).map(|(texts, _)| texts)
     }
 
-    fn check(&self, used: &[UsedRow], target: Vec<(String, String)>) -> Check {
+    fn check(&self, used: &[UsedRow], target: Vec<(String, String)>) -> SubstitutionCheck {
         let zeros = self.tables.zeros;
         let rate = |zero: bool, name: &str| if zero { "0".to_string() } else { name.to_string() };
         let observed = self.platform.observed();

@@ -15,7 +15,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::dag::{Dag, Op};
 use super::values::ConstraintFailure;
-use super::work::{PER_NODE, Step, Work};
+use super::work::{PER_NODE, Work, WorkStep};
 
 /// Number of draws of a block: half of all quadratic equations have a root in a field.
 const TRIES: usize = 60;
@@ -176,7 +176,7 @@ pub(crate) fn hold(
         let nodes = below(dag, node);
         let known: usize = all.iter().map(|g| g.nodes.len()).sum();
         let bytes = 32 * (known + nodes.len()) as u64;
-        work.take(Step::Constraints, 2 * PER_NODE * nodes.len() as u64, bytes)?;
+        work.take(WorkStep::Constraints, 2 * PER_NODE * nodes.len() as u64, bytes)?;
         all.push(Constraint { dag, f, node, nodes });
     }
     // mirrored entries are one node
@@ -187,14 +187,14 @@ pub(crate) fn hold(
     while let Some((_, slots)) = open.iter().min_by_key(|(_, slots)| slots.len()) {
         let slots: Vec<usize> = slots.iter().copied().collect();
         let left: usize = open.iter().map(|(_, s)| s.len()).sum();
-        work.take(Step::Constraints, (left as u64).saturating_mul(slots.len() as u64), 0)?;
+        work.take(WorkStep::Constraints, (left as u64).saturating_mul(slots.len() as u64), 0)?;
         let block: Vec<usize> =
             (open.iter()).filter(|(_, s)| s.iter().all(|s| slots.contains(s))).map(|(c, _)| *c).collect();
         let block_of: Vec<&Constraint<'_>> = block.iter().map(|&c| &all[c]).collect();
         // constraints without free values hold or do not hold
         let operations = block_of.iter().map(|g| g.operations()).fold(0, u64::saturating_add);
         let holds = |values: &[u64]| {
-            work.take(Step::Constraints, operations, 0).is_ok()
+            work.take(WorkStep::Constraints, operations, 0).is_ok()
                 && block_of.iter().all(|g| matches!(g.at(values), (0, d) if d != 0))
         };
         let found = match slots.is_empty() {
@@ -206,7 +206,7 @@ pub(crate) fn hold(
         };
         if !found {
             // a refusal holds for every later try
-            work.take(Step::Constraints, 0, 0)?;
+            work.take(WorkStep::Constraints, 0, 0)?;
             return Err(ConstraintFailure::Constraint(block[0]));
         }
         open.retain(|(c, _)| !block.contains(c));
@@ -227,7 +227,7 @@ fn solve(
     work: &Work,
 ) -> Option<()> {
     let m = block.len();
-    let take = |operations: u64| work.take(Step::Constraints, operations, 0).ok();
+    let take = |operations: u64| work.take(WorkStep::Constraints, operations, 0).ok();
     // along every slot, and at the points that test whether a constraint is linear
     let operations = block.iter().map(|g| g.operations()).fold(0, u64::saturating_add);
     take(operations.saturating_mul(m as u64 + 8).saturating_add((m as u64).saturating_pow(3)))?;

@@ -10,7 +10,7 @@ use super::model::{Role, StateStart};
 use super::rows::{Point, PointBuilder, Rows, dense};
 use super::taylor::{Signal, Singular, Taylor};
 use super::values::Values;
-use super::work::{Step, product};
+use super::work::{WorkStep, product};
 
 /// Numbers of bits that random starts near given values share with these, by attempt.
 pub(super) const CLOSE: [i64; 3] = [10, 25, 40];
@@ -120,7 +120,7 @@ impl<S: Values> PointBuilder<'_, '_, S> {
         let at = Taylor::new(dag, f, places.len(), signals, &starts, constraints, false, seed, self.work)?;
         let (rows, columns) = (constraints.len() as u64, places.len() as u64);
         let elimination = rows.saturating_mul(rows).saturating_mul(columns);
-        self.work.take(Step::Constraints, elimination.saturating_mul(product::<S::Element>()), 0)?;
+        self.work.take(WorkStep::Constraints, elimination.saturating_mul(product::<S::Element>()), 0)?;
         let mut space = S::Space::new(self.field.clone(), places.len());
         let mut out = Vec::new();
         for (c, &node) in constraints.iter().enumerate() {

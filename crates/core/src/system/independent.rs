@@ -26,7 +26,7 @@ use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::{Layout, PointBuilder, random_field};
 use super::taylor::{Signal, Taylor};
 use super::values::Values;
-use super::work::{Spent, Step, Work};
+use super::work::{Spent, Work, WorkStep};
 use crate::language::Function;
 
 /// Largest number of points at which gradients are computed.
@@ -185,7 +185,10 @@ fn is_free(
         // each row against all before it
         let (count, columns) = (rows.len() as u64, rows[0].len() as u64);
         let elimination = count.saturating_mul(count).saturating_mul(columns);
-        if builder.work.take(Step::Independence, elimination, 8 * count.saturating_mul(2 * columns)).is_err()
+        if builder
+            .work
+            .take(WorkStep::Independence, elimination, 8 * count.saturating_mul(2 * columns))
+            .is_err()
         {
             return false;
         }

@@ -1,7 +1,7 @@
 //! Verdicts on any system: degrees on which two random points agree, modulo two primes or in many digits.
 
 use obsdeg_exact::certainty::{RankClaim, error_bound};
-use obsdeg_exact::{Echelon, Field, Gap, Reals, RootField, RowSpace, SplitMix64};
+use obsdeg_exact::{Echelon, Field, RankMargin, Reals, RootField, RowSpace, SplitMix64};
 
 use super::addition::written_apart;
 use super::branches::{BranchSide, Signs, sided, sides};
@@ -14,7 +14,7 @@ use super::real_points::{dependent_at_points, real_point};
 use super::rows::{Layout, PointBuilder, SystemRows, random_field};
 use super::taylor::Singular;
 use super::values::Values;
-use super::work::{Spent, Step, Work, product};
+use super::work::{Spent, Work, WorkStep, product};
 use crate::degree::findings::{ByPrimes, Findings};
 use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
@@ -131,7 +131,7 @@ pub(crate) struct PointDegrees<S: Values> {
     ended: bool,
     /// True if the point is generic, so that an order that adds nothing is the last.
     closed: bool,
-    gap: Gap,
+    gap: RankMargin,
     steps: OrderedRows<S>,
     /// Signs of the arguments of abs and sign.
     signs: Signs,
@@ -217,7 +217,7 @@ fn climbed<S: Values>(
     let degrees = climb(&mut rows, &mut basis, |order, basis| {
         // rows that were computed again; a refusal ends the climb
         let again = basis.refined() - std::mem::replace(&mut refined, basis.refined());
-        let _refused = work.take(Step::Derivatives(order), again.saturating_mul(product), 0);
+        let _refused = work.take(WorkStep::Derivatives(order), again.saturating_mul(product), 0);
         for (degree, gradient) in found.iter_mut().zip(&gradients) {
             if degree.is_none() && basis.contains(gradient) {
                 *degree = Some(order);
@@ -579,7 +579,7 @@ fn pair<const A: usize, const B: usize>(
     let random = |i: usize| model.random(seed, &format!("verdicts, {A} and {B} words, point {i}"));
     let decimal = |bits: f64| bits * std::f64::consts::LOG10_2;
     let digits = [A, B].map(|n| decimal(64.0 * n as f64) as usize);
-    let unclear = |gap: Gap, digits: usize| {
+    let unclear = |gap: RankMargin, digits: usize| {
         // error bounds as wide as their numbers decide nothing
         if gap.zero >= 0.0 {
             return format!(

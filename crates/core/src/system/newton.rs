@@ -5,7 +5,7 @@ use obsdeg_exact::{Ball, RealSpace, Reals, RowSpace, Scalars, SplitMix64};
 use super::dag::{Dag, Op};
 use super::taylor::{Signal, Taylor};
 use super::values::ConstraintFailure;
-use super::work::{Step, Work, product};
+use super::work::{Work, WorkStep, product};
 
 /// Number of steps of Newton's method from one start: near a point they double the digits.
 const STEPS: usize = 80;
@@ -150,7 +150,7 @@ impl Newton<'_> {
         // rank of the rows, their products, and the system of these
         let (rows, columns) = (self.sums.len() as u64, self.places.len() as u64);
         let pairs = rows.saturating_mul(rows).saturating_mul(rows.saturating_add(columns.saturating_mul(2)));
-        self.work.take(Step::Constraints, pairs.saturating_mul(product::<Ball<N>>()), 0).ok()?;
+        self.work.take(WorkStep::Constraints, pairs.saturating_mul(product::<Ball<N>>()), 0).ok()?;
         let here: Vec<Ball<N>> = self.places.iter().map(|&s| values[s]).collect();
         let nothing = f64::NEG_INFINITY;
         let mut out = Linear {
@@ -228,7 +228,7 @@ impl Newton<'_> {
         out
     }
 
-    /// Step from far away that leads nearer: by the logarithms, which bring a high power near its value in
+    /// WorkStep from far away that leads nearer: by the logarithms, which bring a high power near its value in
     /// few steps, or by the sums. The one that leads nearest is taken, shortened if neither does. `None` if
     /// none was found.
     fn nearer<const N: usize>(
@@ -329,7 +329,8 @@ pub(super) fn hold_by_newton<const N: usize>(
     let newton =
         Newton { dag, sums: constraints.iter().map(|&node| Sum::new(dag, node)).collect(), places, work };
     // a refusal holds for all later steps
-    let failed = |reason| work.take(Step::Constraints, 0, 0).map_or(ConstraintFailure::Refused, |()| reason);
+    let failed =
+        |reason| work.take(WorkStep::Constraints, 0, 0).map_or(ConstraintFailure::Refused, |()| reason);
     let (mut steps, mut stuck) = (StepHistory::default(), false);
     let mut linear = newton.linear(values).ok_or_else(|| failed(ConstraintFailure::Constraint(0)))?;
     for _ in 0..STEPS {

@@ -1,14 +1,14 @@
 //! Any system as a source of derivative rows: the dual components of the Taylor coefficients of its outputs.
 
 use obsdeg_exact::prime::is_prime;
-use obsdeg_exact::{Field, Gap, RowSpace, Scalars, SplitMix64};
+use obsdeg_exact::{Field, RankMargin, RowSpace, Scalars, SplitMix64};
 
 use super::adjoint::Adjoint;
 use super::branches::{Signs, sided};
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
-use super::work::{Cost, Step, Sweeps, Work, product};
+use super::work::{Cost, Sweeps, Work, WorkStep, product};
 use crate::degree::rows::DerivativeRows;
 
 mod by_output;
@@ -123,7 +123,7 @@ pub(crate) struct SystemRows<'a, S: Values> {
     /// Work of the points that were tried, and of all rows so far.
     work: &'a Work,
     /// Margin of the ranks at generic points.
-    gap: Gap,
+    gap: RankMargin,
 }
 
 /// Condition that ends a run.
@@ -262,7 +262,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         let (f, model) = (&self.field, self.model);
         // each slot searches for its column
         let looks = self.compiled.roles.len().saturating_mul(self.layout.unknowns.len());
-        self.work.take(Step::Points, looks as u64, 0)?;
+        self.work.take(WorkStep::Points, looks as u64, 0)?;
         let mut random = || f.random(rng, attempt);
         let mut signals = Vec::new();
         let mut initial = vec![None; self.compiled.roles.len()];
@@ -478,7 +478,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         number: usize,
         apart: bool,
         rng: &mut SplitMix64,
-        gap: &mut Gap,
+        gap: &mut RankMargin,
     ) -> Result<RunRows<'a, S>, Singular> {
         let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
         let point = &start.point;
@@ -640,7 +640,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
         let mut shared = SharedValues::<S> { parameters, constants, time };
         let whole = [CompiledSegment::default()];
         let segments = if compiled.segments.is_empty() { &whole[..] } else { &compiled.segments };
-        let (mut runs, mut gap): (Vec<RunRows<'a, S>>, Gap) = (Vec::new(), Gap::OPEN);
+        let (mut runs, mut gap): (Vec<RunRows<'a, S>>, RankMargin) = (Vec::new(), RankMargin::OPEN);
         for experiment in 0..model.experiments.max(1) {
             let mut start = builder.start(experiment, &mut shared, rng, attempt)?;
             for (number, segment) in segments.iter().enumerate() {
@@ -674,7 +674,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
     }
 
     /// Margin of the ranks of single runs.
-    pub(crate) fn gap(&self) -> Gap {
+    pub(crate) fn gap(&self) -> RankMargin {
         self.runs.iter().fold(self.gap, |gap, run| gap.and(run.own.gap()))
     }
 
@@ -770,7 +770,7 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
                     if single && run.end == EndCondition::Stagnation { new } else { run.own.insert(&row) };
             }
             let again = (run.own.refined() - before).saturating_mul(product::<S::Element>());
-            if self.work.take(Step::Derivatives(order), again, 0).is_err() {
+            if self.work.take(WorkStep::Derivatives(order), again, 0).is_err() {
                 return false;
             }
             run.done = run.end.is_reached(0, order, grew, run.own.rank());

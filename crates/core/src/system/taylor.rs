@@ -13,7 +13,7 @@ use obsdeg_exact::{SplitMix64, interrupt};
 use super::constraints::below;
 use super::dag::{Dag, Op};
 use super::values::{ConstraintFailure, Values};
-use super::work::{PER_NODE, Refused, Step, Work, operations_of, product};
+use super::work::{PER_NODE, Refused, Work, WorkStep, operations_of, product};
 use crate::language::Function;
 
 /// Content of a slot in one run.
@@ -166,7 +166,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         let gradients = (0..n).filter(|&i| out.differentiated[i] && !out.known[i]);
         let numbers: u64 = gradients.map(|i| out.support[i].len() as u64).sum();
         let bytes = numbers.saturating_mul(size_of::<S::Element>() as u64);
-        work.take(Step::Gradients, numbers.saturating_mul(2 * product::<S::Element>()), bytes)?;
+        work.take(WorkStep::Gradients, numbers.saturating_mul(2 * product::<S::Element>()), bytes)?;
         out.start_duals(initial)?;
         out.length = 1;
         Ok(out)
@@ -241,7 +241,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     }
 
     fn start_values(&mut self, initial: &[Option<Initial<S::Element>>], work: &Work) -> Result<(), Singular> {
-        work.take(Step::Points, PER_NODE * self.dag.ops.len() as u64, 0)?;
+        work.take(WorkStep::Points, PER_NODE * self.dag.ops.len() as u64, 0)?;
         for (i, op) in self.dag.ops.iter().enumerate() {
             // the content of a slot is needed even if nothing uses it
             let x = match *op {
@@ -253,7 +253,7 @@ impl<'a, S: Values> Taylor<'a, S> {
                     | Signal::Time { value } => *value,
                 },
                 op if self.needed[i] => {
-                    work.take(Step::Points, operations_of::<S::Element>(op), 0)?;
+                    work.take(WorkStep::Points, operations_of::<S::Element>(op), 0)?;
                     self.start_value(i)?
                 }
                 _ => continue,
@@ -322,7 +322,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         let mut sets = self.lanes_of_slots(initial, words);
         // add lanes of operands until nothing is added
         loop {
-            work.take(Step::Gradients, operations, bytes)?;
+            work.take(WorkStep::Gradients, operations, bytes)?;
             if !self.add_lanes_of_operands(&mut sets, words, moving) {
                 break;
             }

@@ -89,9 +89,9 @@ impl Default for WorkLimit {
     }
 }
 
-/// Step that may exceed the limit.
+/// WorkStep that may exceed the limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum WorkStep {
     /// Values of the model at the random points that are tried.
     Points,
     /// Random points at which constraints hold.
@@ -104,7 +104,7 @@ pub(crate) enum Step {
     Derivatives(usize),
 }
 
-impl Step {
+impl WorkStep {
     /// Description of the step in words.
     fn words(self) -> String {
         match self {
@@ -127,7 +127,7 @@ pub(crate) struct Work {
     limit: WorkLimit,
     spent: Cell<u64>,
     /// First refusal: the step, with the operations and the bytes that it would have reached.
-    refused: Cell<Option<(Step, u64, u64)>>,
+    refused: Cell<Option<(WorkStep, u64, u64)>>,
 }
 
 /// Series that the rows of an order take when computed backwards.
@@ -214,14 +214,14 @@ impl Work {
     /// Counts the rows of an order before they are computed; false if they exceed the limit.
     pub(super) fn spend(&self, order: usize, cost: &Cost) -> bool {
         let (operations, bytes) = (cost.operations(order as u64), cost.bytes(order as u64));
-        self.take(Step::Derivatives(order), operations, bytes).is_ok()
+        self.take(WorkStep::Derivatives(order), operations, bytes).is_ok()
     }
 
     /// Counts operations before they are done, and bytes before they are allocated.
     ///
     /// # Errors
     /// [`Refused`] if they exceed the limit, or if anything was refused before.
-    pub(super) fn take(&self, step: Step, operations: u64, bytes: u64) -> Result<(), Refused> {
+    pub(super) fn take(&self, step: WorkStep, operations: u64, bytes: u64) -> Result<(), Refused> {
         if self.refused.get().is_some() {
             return Err(Refused);
         }
@@ -314,11 +314,11 @@ mod tests {
     fn a_refusal_stays() {
         let work = Work::new(WorkLimit(1));
         assert_eq!(
-            [(400_000, 0), (600_000, 500_000)].map(|(n, b)| work.take(Step::Points, n, b)),
+            [(400_000, 0), (600_000, 500_000)].map(|(n, b)| work.take(WorkStep::Points, n, b)),
             [Ok(()); 2]
         );
-        assert_eq!(work.take(Step::Gradients, 0, 500_001), Err(Refused));
-        assert_eq!(work.take(Step::Constraints, 0, 0), Err(Refused));
+        assert_eq!(work.take(WorkStep::Gradients, 0, 500_001), Err(Refused));
+        assert_eq!(work.take(WorkStep::Constraints, 0, 0), Err(Refused));
         let message = work.refused().expect("refused").to_string();
         assert!(message.contains("gradients of its operations take 5.0e5 bytes"), "{message}");
         assert_eq!([0, 1, UNIT, UNIT + 1, 9 * UNIT].map(|n| WorkLimit(3).within(n).0), [0, 1, 1, 2, 3]);
@@ -327,9 +327,9 @@ mod tests {
         spent.add(&work);
         assert!(spent.refused && spent.operations == 2_000_000);
         for (step, words) in [
-            (Step::Points, "values of its operations at random points take 1.0e7 operations"),
-            (Step::Constraints, "points at which its constraints hold take"),
-            (Step::Independence, "gradients of the arguments of its functions take"),
+            (WorkStep::Points, "values of its operations at random points take 1.0e7 operations"),
+            (WorkStep::Constraints, "points at which its constraints hold take"),
+            (WorkStep::Independence, "gradients of the arguments of its functions take"),
         ] {
             let work = Work::new(WorkLimit(1));
             assert_eq!(work.take(step, 10_000_000, 0), Err(Refused));

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 
 use obsdeg_core::system::PointRows;
-use obsdeg_exact::{Field, Gap, Reals, RowSpace, Scalars};
+use obsdeg_exact::{Field, RankMargin, Reals, RowSpace, Scalars};
 
 /// Set of candidates, one bit each.
 pub type Set = u64;
@@ -44,7 +44,7 @@ pub struct Ordered<S: Scalars> {
     /// Number of outputs whose rows end with the first that depends on the rows before it: all of them, or 0
     /// where that does not hold.
     ending: usize,
-    gap: Mutex<Gap>,
+    gap: Mutex<RankMargin>,
 }
 
 impl<S: Scalars> Ordered<S> {
@@ -546,7 +546,7 @@ mod tests {
             rows.iter().cloned().enumerate().take_while(|(_, row)| space.insert(row)).collect()
         };
         let outputs = rows.iter().map(own).collect();
-        PointRows { field: f, columns, known: Vec::new(), outputs, ended: true, gap: Gap::OPEN }
+        PointRows { field: f, columns, known: Vec::new(), outputs, ended: true, gap: RankMargin::OPEN }
     }
 
     /// Random quadratic systems of three states and three parameters with four outputs: the degrees under
@@ -587,8 +587,14 @@ mod tests {
         let f = Field::new((1 << 60) + 33);
         let unit = |c: usize| (0..2).map(|j| if j == c { f.one() } else { 0 }).collect::<Vec<u64>>();
         let outputs = vec![vec![(0, unit(0))], vec![(0, unit(0)), (1, unit(1))]];
-        let start =
-            PointRows { field: f, columns: 2, known: Vec::new(), outputs, ended: true, gap: Gap::OPEN };
+        let start = PointRows {
+            field: f,
+            columns: 2,
+            known: Vec::new(),
+            outputs,
+            ended: true,
+            gap: RankMargin::OPEN,
+        };
         let degrees = |point: &PointRows<Field>, generic| {
             Ordered::new(point, &[1, 2], &[0, 1], generic).degrees(3).into_vec()
         };

@@ -5,14 +5,14 @@ use symbolica::prelude::*;
 use super::JobError;
 use super::derive::derivatives;
 use super::tower::{Element, Tower, atom};
-use crate::protocol::{Check, System};
+use crate::protocol::{SubstitutionCheck, System};
 
 /// Solves the system. Returns `x` or `P x` as text, and true if the check was made; a check that does
 /// not hold is an error.
 pub(crate) fn solve(
     tower: &Tower,
     system: &System,
-    check: Option<&Check>,
+    check: Option<&SubstitutionCheck>,
 ) -> Result<(Vec<String>, bool), JobError> {
     let unknowns = system.matrix.first().map_or(0, Vec::len);
     shape("right side", system.right.len(), system.matrix.len())?;
@@ -90,7 +90,7 @@ fn eliminate(tower: &Tower, mut rows: Vec<Vec<Element>>, unknowns: usize) -> Res
 
 /// Differentiates the outputs along the dynamics, substitutes the states of each segment, and compares
 /// the combination with the target, unknown by unknown.
-fn verify(tower: &Tower, x: &[Element], check: &Check) -> Result<(), JobError> {
+fn verify(tower: &Tower, x: &[Element], check: &SubstitutionCheck) -> Result<(), JobError> {
     shape("check", check.terms.len(), x.len())?;
     shape("target", check.target.len(), check.unknowns.len())?;
     let order = check.terms.iter().flatten().map(|t| t.order).max().unwrap_or(0);

@@ -5,12 +5,12 @@
 //! `V_k(y)` over its outputs. So a row of y in the span of rows of y of no higher order adds nothing to any
 //! set: it is left out.
 
-use obsdeg_exact::{Gap, RowSpace, Scalars, SplitMix64};
+use obsdeg_exact::{RankMargin, RowSpace, Scalars, SplitMix64};
 
 use super::super::model::{Compiled, SystemModel};
 use super::super::taylor::Singular;
 use super::super::values::Values;
-use super::super::work::{Step, Work, product};
+use super::super::work::{Work, WorkStep, product};
 use super::{AdditionalRuns, Layout, PointBuilder, SystemRows, cost_of, rows_of};
 
 /// Rows of an output: order, and differential of a derivative by the unknowns.
@@ -31,7 +31,7 @@ pub struct PointRows<S: Scalars> {
     /// True if the end of the rows of every output is proven.
     pub ended: bool,
     /// Margin of the rank decisions.
-    pub gap: Gap,
+    pub gap: RankMargin,
 }
 
 impl<'a, S: Values> SystemRows<'a, S> {
@@ -91,7 +91,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
                 let before = spaces[i].refined();
                 let grew = spaces[i].insert(&row);
                 let again = (spaces[i].refined() - before).saturating_mul(product::<S::Element>());
-                work.take(Step::Derivatives(order), again, 0).ok()?;
+                work.take(WorkStep::Derivatives(order), again, 0).ok()?;
                 done[i] = run.end.is_reached(i, order, grew, spaces[i].rank());
                 if grew {
                     outputs[i].push((order, row));

@@ -1,12 +1,12 @@
 //! Ranks of the rows of a run at a generic point.
 
-use obsdeg_exact::{Gap, RowSpace, SplitMix64};
+use obsdeg_exact::{RankMargin, RowSpace, SplitMix64};
 
 use super::super::adjoint::Adjoint;
 use super::super::model::Role;
 use super::super::taylor::{Signal, Singular, Taylor};
 use super::super::values::Values;
-use super::super::work::{Step, product};
+use super::super::work::{WorkStep, product};
 use super::{Point, PointBuilder, cost_of, rows_of};
 
 /// Spans of the rows of a run at a generic point, one per group of outputs.
@@ -32,8 +32,8 @@ impl<S: Values> GenericSpans<S> {
     }
 
     /// Margin of the rank decisions.
-    fn gap(&self) -> Gap {
-        self.whole.iter().chain(&self.seen).fold(Gap::OPEN, |gap, space| gap.and(space.gap()))
+    fn gap(&self) -> RankMargin {
+        self.whole.iter().chain(&self.seen).fold(RankMargin::OPEN, |gap, space| gap.and(space.gap()))
     }
 }
 
@@ -48,7 +48,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         known: &[Vec<S::Element>],
         apart: bool,
         rng: &mut SplitMix64,
-    ) -> Option<(Vec<usize>, Gap)> {
+    ) -> Option<(Vec<usize>, RankMargin)> {
         let unknowns = self.layout.unknowns.len();
         let groups = if apart { self.compiled.outputs(point.experiment).len() } else { 1 };
         let states: Vec<usize> =
@@ -128,7 +128,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
             }
             let again = spans.refined() - before;
             self.work
-                .take(Step::Derivatives(order), again.saturating_mul(product::<S::Element>()), 0)
+                .take(WorkStep::Derivatives(order), again.saturating_mul(product::<S::Element>()), 0)
                 .ok()?;
             if !grew {
                 break;
