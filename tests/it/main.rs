@@ -1,6 +1,7 @@
 //! All external tests in one binary: compiled once, linked once, and run in parallel. The tests of the
 //! symbolic worker are a separate binary, because they hold the lock of the engine.
 
+mod algebraic;
 mod allan;
 #[cfg(unix)]
 mod book;

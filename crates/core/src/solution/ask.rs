@@ -124,7 +124,7 @@ impl Solver<'_> {
             };
             observable.solution.iter().map(term).collect()
         });
-        Check {
+        SubstitutionCheck {
             dynamics: dynamics_text(&rate(zeros.w_n, "wN"), &rate(zeros.w_u, "wU"), observed, state),
             unknowns: (0..self.platform.names().len()).map(unknown).collect(),
             segments: segments.collect(),

@@ -7,6 +7,7 @@
 
 mod addition;
 mod adjoint;
+mod algebraic;
 mod answer;
 mod branches;
 mod candidates;
@@ -62,9 +63,9 @@ pub use error::ModelError;
 pub use gathered::{Gathered, OutputRows, gather};
 pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
 pub use model::{
-    Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, ExperimentChanges, FilePlace,
-    KnownInput, ModelSegment, Named, Nominal, PlacedExpression, Role, StartTime, State, StateStart,
-    SystemModel,
+    AlgebraicEquation, Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, ExperimentChanges,
+    FilePlace, KnownInput, ModelSegment, Named, Nominal, PlacedExpression, Role, StartTime, State,
+    StateStart, SystemModel,
 };
 pub use reduced::{Reduced, ReducedError, reduced};
 pub use rows::{Layout, OwnRows, PointRows, Unknown};

@@ -65,6 +65,20 @@ pub struct State {
     pub start: StateStart,
 }
 
+/// Algebraic unknown with its equation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AlgebraicEquation {
+    /// Name, unit and description of the unknown.
+    pub named: Named,
+    /// Expression that is zero.
+    pub equation: PlacedExpression,
+}
+
+/// True for the name of a derived quantity: it has a third index, which no name of a file has.
+pub(super) fn is_derived(name: &str) -> bool {
+    name.matches(',').count() == 2
+}
+
 /// Known input.
 #[derive(Debug, Clone, PartialEq)]
 pub enum KnownInput {
@@ -174,6 +188,8 @@ pub struct SystemModel {
     pub discrete: bool,
     /// States of the system.
     pub states: Vec<State>,
+    /// Algebraic equations as read; their unknowns are among the states, the equations among the constraints.
+    pub algebraic: Vec<AlgebraicEquation>,
     /// Unknown constants.
     pub parameters: Vec<Named>,
     /// Known inputs, each with its kind.
@@ -421,29 +437,42 @@ impl SystemModel {
             inputs.extend(own.map(|(e, f)| (&named.name, format!(" in experiment {}", e + 1), f)));
         }
         let inputs = inputs.iter().map(|(name, at, f)| (*name, at.as_str(), *f));
-        let definitions = self.definitions.iter().map(|(n, e)| (n, "", e));
+        let definitions = self.definitions.iter().filter(|d| !is_derived(&d.0)).map(|(n, e)| (n, "", e));
         let next = if self.discrete { "[t+1]" } else { "'" };
-        let states = self.states.iter().map(|s| (&s.named.name, next, &s.equation));
+        let differential = |s: &&State| {
+            !self.algebraic.iter().any(|a| a.named.name == s.named.name) && !s.equation.text.is_empty()
+        };
+        let states = self.states.iter().filter(differential).map(|s| (&s.named.name, next, &s.equation));
         let outputs = self.outputs.iter().map(|(n, e)| (&n.name, "", e));
         let base = |name: &str| name.split('[').next().unwrap_or_default().to_string();
-        let mut out = Vec::new();
-        let all: Vec<_> = inputs.chain(definitions).chain(states).chain(outputs).collect();
-        for (i, (name, sign, e)) in all.iter().enumerate() {
-            let same = |j: usize| all.get(j).is_some_and(|o| base(o.0) == base(name) && o.2.place == e.place);
-            match (i > 0 && same(i - 1), same(i + 1)) {
-                (true, _) => {}
-                (false, true) => out.push(format!("{}{sign} = {}", base(name), e.text)),
-                (false, false) => out.push(format!("{name}{sign} = {}", e.text)),
-            }
-        }
-        out
+        let lines = |all: Vec<(&String, &str, &PlacedExpression)>| -> Vec<String> {
+            let line = |(i, (name, sign, e)): (usize, &(&String, &str, &PlacedExpression))| {
+                let same =
+                    |j: usize| all.get(j).is_some_and(|o| base(o.0) == base(name) && o.2.place == e.place);
+                match (i > 0 && same(i - 1), same(i + 1)) {
+                    (true, _) => None,
+                    (false, true) => Some(format!("{}{sign} = {}", base(name), e.text)),
+                    (false, false) => Some(format!("{name}{sign} = {}", e.text)),
+                }
+            };
+            all.iter().enumerate().filter_map(line).collect()
+        };
+        let mut algebraic: Vec<String> =
+            self.algebraic.iter().map(|a| format!("0 = {}", a.equation.text)).collect();
+        algebraic.dedup();
+        [lines(inputs.chain(definitions).chain(states).collect()), algebraic, lines(outputs.collect())]
+            .concat()
     }
 
     /// Constraints as written; one text may contain those of all entries of a vector.
     pub(crate) fn constraint_texts(&self) -> Vec<String> {
         let mut out: Vec<&PlacedExpression> = self.constraints.iter().collect();
         out.dedup_by(|a, b| a.place == b.place);
-        out.into_iter().map(|c| c.text.clone()).collect()
+        let text = |c: &PlacedExpression| match self.algebraic.iter().any(|a| a.equation.place == c.place) {
+            true => format!("{} = 0", c.text),
+            false => c.text.clone(),
+        };
+        out.into_iter().map(text).collect()
     }
 
     /// Known input in an experiment (counted from 0).

@@ -10,11 +10,11 @@ use toml::Value;
 
 use super::error::ModelError;
 use super::model::{
-    Constant, ExperimentChanges, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelSegment, Named,
-    PlacedExpression, StartTime, State, StateStart, SystemModel, check_signs,
+    AlgebraicEquation, Constant, ExperimentChanges, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelSegment,
+    Named, PlacedExpression, StartTime, State, StateStart, SystemModel, check_signs,
 };
 use super::nominal::{SimulationEntry, nominal};
-use super::reader::{Formulas, ModelReader, base, declared, in_order, last_mention};
+use super::reader::{Entry, Formulas, ModelReader, base, declared, in_order, last_mention};
 use crate::language::file_error::explain;
 use crate::language::{Node, Shape, Shapes, nearest, parse};
 use crate::model::recording::{ModelRecord, Recording};
@@ -49,6 +49,12 @@ pub struct ModelFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, serde_json::Value>")]
     states: BTreeMap<String, Spanned<Value>>,
+    /// Algebraic unknowns, each with an expression that is zero, `v = "R*i - v"`, or a table with equation,
+    /// unit, description. Together the equations determine them (index 1); they hold + - * / and whole powers
+    /// of states, algebraic unknowns, parameters, constants and known inputs.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    algebraic: BTreeMap<String, Spanned<Value>>,
     /// Unknown constants: a list of names, or tables with unit and description.
     #[serde(default)]
     #[schemars(with = "serde_json::Value")]
@@ -436,14 +442,16 @@ impl ModelReader<'_> {
         // sizes first: expressions may use names that are declared later
         let (states, known, unknown) =
             (in_order(&file.states), in_order(&file.known_inputs), in_order(&file.unknown_inputs));
-        for (key, value) in states.iter().chain(&known).chain(&unknown) {
+        let algebraic = in_order(&file.algebraic);
+        for (key, value) in states.iter().chain(&algebraic).chain(&known).chain(&unknown) {
             self.declare(key, value.span())?;
         }
         if let Some(parameters) = &file.parameters {
             model.parameters = self.parameters(parameters)?;
         }
         let (constants, definitions) = (in_order(&file.constants), in_order(&file.definitions));
-        self.names_of_their_own(&[&states, &known, &unknown, &constants, &definitions], &model.parameters)?;
+        let all: [&[Entry<'_>]; 6] = [&states, &algebraic, &known, &unknown, &constants, &definitions];
+        self.names_of_their_own(&all, &model.parameters)?;
         for (key, value) in self.by_use("the constant", &constants)? {
             model.constants.extend(self.constants(key, value)?);
         }
@@ -454,6 +462,10 @@ impl ModelReader<'_> {
         }
         for (key, value) in states {
             model.states.extend(self.states(base(key), value)?);
+        }
+        for (key, value) in algebraic {
+            let equation = |s: State| AlgebraicEquation { named: s.named, equation: s.equation };
+            model.algebraic.extend(self.states(base(key), value)?.into_iter().map(equation));
         }
         for (key, value) in known {
             model.known_inputs.extend(self.known_inputs(base(key), value)?);
@@ -541,6 +553,7 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     }
     model.time = file.time.as_ref().map_or(Ok(StartTime::Zero), |time| r.time(time))?;
     r.conditions(&file, &mut model)?;
+    let mut model = model.without_algebraic().map_err(|e| placed(text, e))?;
     model.candidates = r.file_candidates(&in_order(&file.candidates))?;
     model.check_candidates()?;
     nominal(&r, &outputs, &file.simulation, &mut model)?;
@@ -551,11 +564,15 @@ pub fn read(text: &str) -> Result<SystemModel, ModelError> {
     Ok(model.by_one_factor())
 }
 
+/// Error with the place of the last mention of its subject, if it has none.
+fn placed(text: &str, e: ModelError) -> ModelError {
+    ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e }
+}
+
 /// Checks that concern the model as a whole. Errors without a place get that of the last mention of their
 /// subject.
 fn check_whole(text: &str, is_named: bool, model: &SystemModel) -> Result<(), ModelError> {
-    let placed =
-        |e: ModelError| ModelError { span: e.span.clone().or_else(|| last_mention(text, &e.what)), ..e };
+    let placed = |e: ModelError| placed(text, e);
     model.check().map_err(placed)?;
     if !model.candidates.is_empty() {
         model.measuring(&model.candidates, true).0.checked().map_err(placed)?;

@@ -1,0 +1,174 @@
+//! Algebraic equations: the verdicts are those of the same system with the algebraic unknowns eliminated, or
+//! differentiated, by hand.
+
+use std::collections::BTreeMap;
+
+use obsdeg_core::system::{SystemAnalysis, SystemOptions, analyze_system, model_file};
+use obsdeg_exact::SplitMix64;
+
+fn analyzed(text: &str) -> SystemAnalysis {
+    let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
+    analyze_system(&model, SystemOptions::default()).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// Status and degree by unknown.
+fn verdicts(text: &str) -> BTreeMap<String, (String, Option<usize>)> {
+    let a = analyzed(text);
+    a.quantities.iter().map(|q| (q.name.clone(), (q.status.to_string(), q.degree))).collect()
+}
+
+/// Asserts that the unknowns of `by_hand` have the same verdicts in both.
+fn same(with: &str, by_hand: &str) {
+    let (with_verdicts, expected) = (verdicts(with), verdicts(by_hand));
+    for (name, verdict) in &expected {
+        assert_eq!(with_verdicts.get(name), Some(verdict), "{name} of\n{with}\n{by_hand}");
+    }
+}
+
+fn model(head: &str, states: &str, algebraic: &str, parameters: &[&str], outputs: &str) -> String {
+    let parameters: Vec<String> = parameters.iter().map(|p| format!("{p:?}")).collect();
+    let algebraic = if algebraic.is_empty() { String::new() } else { format!("[algebraic]\n{algebraic}\n") };
+    format!(
+        "name = \"m\"\nparameters = [{}]\n{head}\n[states]\n{states}\n{algebraic}[outputs]\n{outputs}\n",
+        parameters.join(", ")
+    )
+}
+
+#[test]
+fn eliminated_by_hand() {
+    // an output that is an algebraic unknown
+    same(
+        &model("", "x = \"-p*z\"", "z = \"z - q*x\"", &["p", "q"], "y = \"z\""),
+        &model("", "x = \"-p*q*x\"", "", &["p", "q"], "y = \"q*x\""),
+    );
+    // a current divider: two equations for two currents, one through the other
+    same(
+        &model("", "x = \"-c*i\"", "i = \"i + k - x\"\nk = \"a*i - b*k\"", &["a", "b", "c"], "y = \"k\""),
+        &model("", "x = \"-c*b*x/(a + b)\"", "", &["a", "b", "c"], "y = \"a*x/(a + b)\""),
+    );
+    // the first equation does not hold the first unknown
+    same(
+        &model("", "x = \"i - x\"", "i = \"k - a*x\"\nk = \"i*k - x\"", &["a"], "y = \"x\""),
+        &model("", "x = \"1/a - x\"", "", &["a"], "y = \"x\""),
+    );
+    // a known input in an equation, a constant one, and definitions
+    for kind in ["generic", "constant"] {
+        let input = format!("known_inputs = {{ u = \"{kind}\" }}");
+        let defined = format!("{input}\ndefinitions = {{ drop = \"r*(u - x)\" }}");
+        same(
+            &model(&defined, "x = \"z - k*x\"", "z = \"z - drop\"", &["r", "k"], "y = \"z\""),
+            &model(&input, "x = \"r*(u - x) - k*x\"", "", &["r", "k"], "y = \"r*(u - x)\""),
+        );
+    }
+    // two experiments
+    same(
+        &model("experiments = 2", "x = \"-p*z\"", "z = \"z - q*x\"", &["p", "q"], "y = \"x\""),
+        &model("experiments = 2", "x = \"-p*q*x\"", "", &["p", "q"], "y = \"x\""),
+    );
+}
+
+/// A quadratic equation, whose solution no rational formula gives: its derivative by hand, with the equation
+/// as a constraint.
+#[test]
+fn differentiated_by_hand() {
+    same(
+        &model("", "x = \"-a*x + z\"", "z = \"z^2 + z - b*x\"", &["a", "b"], "y = \"x\""),
+        &model(
+            "constraints = [\"z^2 + z = b*x\"]",
+            "x = \"-a*x + z\"\nz = \"b*(-a*x + z)/(2*z + 1)\"",
+            "",
+            &["a", "b"],
+            "y = \"x\"",
+        ),
+    );
+    // a vector of algebraic unknowns
+    same(
+        &model(
+            "",
+            "x = \"-v[1]*x\"",
+            "\"v[2]\" = \"[v[1]*v[2] - a*x, v[1] + v[2] - b]\"",
+            &["a", "b"],
+            "y = \"x\"",
+        ),
+        &model(
+            "constraints = [\"v1*v2 = a*x\", \"v1 + v2 = b\"]",
+            "x = \"-v1*x\"\nv1 = \"-a*v1*x/(v2 - v1)\"\nv2 = \"a*v1*x/(v2 - v1)\"",
+            "",
+            &["a", "b"],
+            "y = \"x\"",
+        ),
+    );
+}
+
+/// Random linear systems with two algebraic unknowns, eliminated by Cramer's rule.
+#[test]
+fn random_linear_systems() {
+    let mut rng = SplitMix64::new(38_001_128);
+    let (mut tried, mut lost) = (0, 0);
+    while tried < 25 {
+        let names = ["p", "q", "r"];
+        let mut entry = || match rng.below(6) {
+            0 | 1 => "0".to_string(),
+            2 | 3 => (1 + rng.below(3)).to_string(),
+            k => names[(k as usize + rng.below(2) as usize) % 3].to_string(),
+        };
+        let [a, b, c, d] = [(); 4].map(|()| [[entry(), entry()], [entry(), entry()]]);
+        let [e, f] = [(); 2].map(|()| [entry(), entry()]);
+        // 0 = c x + d z
+        let det = format!("({}*({}) - {}*({}))", d[0][0], d[1][1], d[0][1], d[1][0]);
+        let singular = |i: usize, j: usize| d[i][j] == "0";
+        if (singular(0, 0) || singular(1, 1)) && (singular(0, 1) || singular(1, 0)) || d[0] == d[1] {
+            continue;
+        }
+        let right = |i: usize| format!("({}*x1 + {}*x2)", c[i][0], c[i][1]);
+        let z1 = format!("(({}*{} - {}*{})/{det})", d[0][1], right(1), d[1][1], right(0));
+        let z2 = format!("(({}*{} - {}*{})/{det})", d[1][0], right(0), d[0][0], right(1));
+        let rate = |i: usize, z1: &str, z2: &str| {
+            format!("{}*x1 + {}*x2 + {}*{z1} + {}*{z2}", a[i][0], a[i][1], b[i][0], b[i][1])
+        };
+        let output =
+            |z1: &str, z2: &str| format!("{}*x1 + {}*x2 + {}*{z1} + {}*{z2}", e[0], e[1], f[0], f[1]);
+        let states =
+            |z1: &str, z2: &str| format!("x1 = \"{}\"\nx2 = \"{}\"", rate(0, z1, z2), rate(1, z1, z2));
+        let equation = |i: usize| format!("{} + {}*z1 + {}*z2", right(i), d[i][0], d[i][1]);
+        let algebraic = format!("z1 = \"{}\"\nz2 = \"{}\"", equation(0), equation(1));
+        let with =
+            model("", &states("z1", "z2"), &algebraic, &names, &format!("y = \"{}\"", output("z1", "z2")));
+        let by_hand = model("", &states(&z1, &z2), "", &names, &format!("y = \"{}\"", output(&z1, &z2)));
+        // a determinant may still vanish, as 1*2 - 2*1
+        let Ok(hand) = model_file::read(&by_hand)
+            .map_err(|_| ())
+            .and_then(|m| analyze_system(&m, SystemOptions::default()).map_err(|_| ()))
+        else {
+            continue;
+        };
+        same(&with, &by_hand);
+        tried += 1;
+        lost += usize::from(hand.quantities.iter().any(|q| q.degree.is_none()));
+    }
+    assert!(lost > 5 && lost < 25, "{lost}");
+}
+
+/// The answer shows the equations as written, and what is not possible is named.
+#[test]
+fn equations_and_refusals() {
+    let a = analyzed(&model("", "x = \"-p*z\"", "z = \"z - q*x\"", &["p", "q"], "y = \"z\""));
+    assert_eq!(a.equations, ["x' = -p*z", "0 = z - q*x", "y = z"]);
+    assert_eq!(a.constraints, ["z - q*x = 0"]);
+    assert_eq!(a.quantities.iter().map(|q| q.name.as_str()).collect::<Vec<_>>(), ["x", "z", "p", "q"]);
+    let refused = |text: &str, word: &str| {
+        let error = model_file::read(text).expect_err(text).to_string();
+        assert!(error.contains(word), "{error}: {text}");
+    };
+    let one = |head: &str, equation: &str| {
+        model(head, "x = \"-z\"", &format!("z = \"{equation}\""), &["p"], "y = \"x\"")
+    };
+    refused(&one("", "x - p"), "index 1");
+    refused(&one("", "z - sin(x)"), "a function");
+    refused(&one("", "z - t*x"), "time");
+    refused(&one("", "z - x^p"), "power");
+    refused(&one("unknown_inputs = { w = \"arbitrary\" }", "z - w"), "unknown input `w`");
+    refused(&one("known_inputs = { u = { polynomial = 2 } }", "z - u"), "generic or constant");
+    refused(&one("discrete = true", "z - x"), "continuous time");
+    refused(&one("", "z - nobody"), "nobody");
+}
