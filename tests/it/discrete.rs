@@ -196,7 +196,7 @@ fn linear_systems_by_kalman() {
         let (mut span, mut row) = (Span { rows: Vec::new() }, c.clone());
         let mut expected = vec![None; n];
         let mut ranks = Vec::new();
-        for k in 0..=n {
+        for k in 0..=n + 1 {
             span.insert(&row);
             ranks.push(span.rows.len());
             for (i, degree) in expected.iter_mut().enumerate() {

@@ -317,6 +317,10 @@ fn steps(model: &SystemModel, most: Option<usize>, seed: u64) -> Result<Steps, M
             };
         }
         if out.ended {
+            if step == 0 {
+                // the map of a step must have a value, even if it shows nothing more
+                judge(&SystemModel { combinations: Vec::new(), ..model.unrolled(1)? }, seed, None)?;
+            }
             break;
         }
     }
