@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::branches::{BranchSide, branches};
 use super::constraints::ConstraintFactor;
 use super::counts::{Count, CountLimits, Solutions, values_taken};
-use super::discrete::analyze_discrete;
 use super::error::ModelError;
 use super::functions::gcd;
 use super::identifiable::{identifiable_functions, terms_of};
@@ -313,17 +312,6 @@ impl Default for SystemOptions {
             relation_limit: RELATION_LIMIT,
             order: None,
         }
-    }
-}
-
-/// Judges a model, without the symbolic engine.
-///
-/// # Errors
-/// [`ModelError`].
-pub fn analyze_system(model: &SystemModel, options: SystemOptions) -> Result<SystemAnalysis, ModelError> {
-    match model.discrete {
-        true => analyze_discrete(model, options),
-        false => analyzed(model, options).map(|found| found.analysis),
     }
 }
 

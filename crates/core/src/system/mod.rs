@@ -8,6 +8,7 @@
 mod addition;
 mod adjoint;
 mod algebraic;
+mod analyze;
 mod answer;
 mod branches;
 mod candidates;
@@ -54,6 +55,7 @@ pub(crate) mod values;
 mod why;
 pub(crate) mod work;
 
+pub use analyze::analyze_system;
 pub use answer::*;
 pub use branches::BranchSide;
 pub use candidates::{CANDIDATE_WORDS, check_cost};
