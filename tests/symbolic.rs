@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 
 use obsdeg_symbolic::protocol::CheckTerm;
 use obsdeg_symbolic::{
-    Check, Dynamics, Job, Order, Request, System, Waiting, Worker, WorkerConfig, WorkerError,
+    Dynamics, Job, Order, Request, SubstitutionCheck, System, Waiting, Worker, WorkerConfig, WorkerError,
 };
 
 #[path = "../crates/cli/lock.rs"]
@@ -82,7 +82,7 @@ fn a_false_solution_fails_its_verification() {
     let mut w = worker();
     // v = z'; the claim is y z' = v with y = 1 (right) or 2 (wrong)
     let claim = |right: &str| {
-        let check = Check {
+        let check = SubstitutionCheck {
             dynamics: oscillator(),
             unknowns: strings(["u_0", "u_1"]),
             segments: vec![strings(["u_0", "u_1"])],

@@ -1,5 +1,6 @@
 //! The program end to end: real processes, real files.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Child, Output, Stdio};
 
@@ -67,32 +68,32 @@ fn solutions_of_the_fields_wait_for_no_engine() {
     assert_eq!(a["notes"], serde_json::json!([]));
 }
 
-/// A short product of sines and cosines needs no engine: the same coefficient as with it, recovered from its
-/// images in the prime fields.
+/// Solutions of quantities and combinations in an answer, by name or expression.
+fn solutions_of(a: &Value) -> BTreeMap<String, Value> {
+    let lists = ["quantities", "combinations"].map(|key| a[key].as_array().expect("a list"));
+    let name = |q: &Value| q["name"].as_str().or(q["expression"].as_str()).expect("a name").to_string();
+    lists.into_iter().flatten().map(|q| (name(q), q["solution"].clone())).collect()
+}
+
+/// A short product of sines and cosines needs no engine: what is in closed form without it is so with it, and
+/// is recovered from its images in the prime fields.
 #[test]
 fn short_products_need_no_engine() {
     let scheme = ["analyze", "--angles", "0,0,0", "--angles", "40,0,0", "--format", "json"];
-    let solution = |a: &Value, name: &str| {
-        let list = a["quantities"].as_array().expect("a list");
-        list.iter().find(|q| q["name"] == name).expect("it is there")["solution"].clone()
-    };
-    let without = json(&[&scheme[..], &["--symbolic-limit", "0"]].concat());
-    let with = json(&scheme);
+    let without = solutions_of(&json(&[&scheme[..], &["--symbolic-limit", "0"]].concat()));
+    let with = solutions_of(&json(&scheme));
     let mut closed = 0;
-    for q in with["quantities"].as_array().expect("a list") {
-        let name = q["name"].as_str().expect("a name");
-        let (own, other) = (solution(&without, name), solution(&with, name));
-        if own["form"] == "symbolic" {
-            closed += 1;
-            assert_eq!(own["found_by"], "prime_fields", "{own}");
-            assert_eq!(own["verification"], "modular", "{own}");
-            assert!(own["text"].as_str().expect("a text").contains("(40 deg)"), "{own}");
-            if cfg!(feature = "symbolica") {
-                assert_eq!(other["form"], "symbolic", "{other}");
-            }
+    for (name, own) in without.iter().filter(|(_, own)| own["form"] == "symbolic") {
+        closed += 1;
+        assert_eq!(own["found_by"], "prime_fields", "{own}");
+        assert_eq!(own["verification"], "modular", "{own}");
+        assert!(own["text"].as_str().expect("a text").contains("(40 deg)"), "{own}");
+        if let Some(other) = with.get(name).filter(|_| cfg!(feature = "symbolica")) {
+            assert_eq!(other["form"], "symbolic", "{other}");
         }
     }
-    assert!(closed > 2, "{without}");
+    assert!(closed >= 3, "{without:?}");
+    assert_eq!(without["psi_y"]["text"], "(cos(40 deg)/sin(40 deg)) Z1@p1 - (1/sin(40 deg)) Z1@p2");
 }
 
 /// Solutions with sums of sines and cosines are printed with decimals if the engine is not available. A work
@@ -100,9 +101,7 @@ fn short_products_need_no_engine() {
 #[test]
 fn without_the_engine_solutions_are_decimals_and_it_is_said() {
     let refused = json(&[&CONSTANT[..], &["--format", "json", "--symbolic-limit", "0"]].concat());
-    let list = refused["quantities"].as_array().expect("a list");
-    let solved = list.iter().filter(|q| q["solution"].is_object());
-    assert!(solved.clone().any(|q| q["solution"]["found_by"] == "floating_point"), "{refused}");
+    assert!(solutions_of(&refused).values().any(|s| s["found_by"] == "floating_point"), "{refused}");
     let note = refused["notes"].to_string();
     let reason = if cfg!(feature = "symbolica") { "switched off by a limit of 0" } else { "built without" };
     assert!(note.contains(reason), "{note}");

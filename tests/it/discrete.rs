@@ -260,7 +260,9 @@ fn composition_by_hand() {
     let found: Vec<(String, Option<usize>)> =
         a.quantities.iter().map(|q| (q.name.clone(), q.degree)).collect();
     assert_eq!(found, seen);
-    assert!(a.quantities.iter().any(|q| q.degree == None) && a.quantities.iter().any(|q| q.degree > Some(1)));
+    assert!(
+        a.quantities.iter().any(|q| q.degree.is_none()) && a.quantities.iter().any(|q| q.degree > Some(1))
+    );
 }
 
 /// Inputs, the time, vectors, functions, known starts and experiments.

@@ -16,13 +16,14 @@ pub(super) struct AngleProduct {
 /// Factor of a product: a text with the sign of its exponents.
 pub(super) type Powers = Vec<(String, i32)>;
 
-/// Products of powers of `c`, `s`, `1 + c` and `c^2 - s^2` of each angle, simplest first.
+/// Products of powers of `c`, `s`, `1 - c`, `1 + c` and `c^2 - s^2` of each angle, simplest first.
 pub(super) fn products(angles: &[String]) -> Vec<Powers> {
     let mut out: Vec<(usize, Powers)> = vec![(0, Vec::new())];
     for angle in angles {
         let atoms = [
             (format!("c_{angle}"), 1),
             (format!("s_{angle}"), 1),
+            (format!("(1-c_{angle})"), 2),
             (format!("(1+c_{angle})"), 2),
             (format!("(c_{angle}^2-s_{angle}^2)"), 2),
         ];

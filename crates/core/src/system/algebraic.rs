@@ -46,6 +46,9 @@ impl Builder<'_> {
     }
 
     fn times(&mut self, a: Option<usize>, b: usize) -> Option<usize> {
+        if matches!(self.nodes[b], Node::Number { mantissa: 0, .. }) {
+            return None;
+        }
         self.push(Node::Multiply(a?, b))
     }
 
@@ -104,6 +107,12 @@ fn whole(n: i32) -> Node {
     Node::Number { mantissa: n.into(), decimals: 0 }
 }
 
+/// Expression of these operations, all written in a text of `length` bytes.
+fn expression(nodes: Vec<Node>, length: usize) -> Expression {
+    let spans = vec![0..length; nodes.len()];
+    Expression { nodes, spans }
+}
+
 /// Differentiation of a model by time.
 struct Differentiation<'a> {
     model: &'a SystemModel,
@@ -117,8 +126,7 @@ struct Differentiation<'a> {
 impl Differentiation<'_> {
     /// Adds a definition at the place of `of`, and returns its name.
     fn define(&mut self, of: &PlacedExpression, nodes: Vec<Node>) -> String {
-        let spans = vec![0..of.text.len(); nodes.len()];
-        let value = PlacedExpression { expression: Expression { nodes, spans }, ..of.clone() };
+        let value = PlacedExpression { expression: expression(nodes, of.text.len()), ..of.clone() };
         self.made += 1;
         let name = derived("rate", self.made);
         self.out.definitions.push((name.clone(), value));
@@ -210,8 +218,7 @@ impl Differentiation<'_> {
         let rate = derived(&named.name, 1);
         if let Some(i) = self.out.known_inputs.iter().position(|u| u.0.name == named.name) {
             self.out.known_inputs[i].0 = Named { name: rate.clone(), ..named.clone() };
-            let nodes = vec![Node::Name(rate.clone())];
-            let expression = Expression { nodes, spans: vec![0..0] };
+            let expression = expression(vec![Node::Name(rate.clone())], 0);
             let equation = PlacedExpression { expression, ..PlacedExpression::default() };
             self.out.states.push(State { named: named.clone(), equation, start: StateStart::Known });
         }
@@ -309,8 +316,7 @@ impl SystemModel {
         let rates = d.solved(rows)?;
         let mut out = d.out;
         for (AlgebraicEquation { named, equation }, rate) in self.algebraic.iter().zip(rates) {
-            let nodes = vec![Node::Name(rate)];
-            let expression = Expression { nodes, spans: vec![0..equation.text.len()] };
+            let expression = expression(vec![Node::Name(rate)], equation.text.len());
             let rate = PlacedExpression { expression, ..equation.clone() };
             out.states.push(State { named: named.clone(), equation: rate, start: StateStart::Unknown });
             out.constraints.push(equation.clone());

@@ -228,7 +228,7 @@ impl Newton<'_> {
         out
     }
 
-    /// WorkStep from far away that leads nearer: by the logarithms, which bring a high power near its value in
+    /// Step from far away that leads nearer: by the logarithms, which bring a high power near its value in
     /// few steps, or by the sums. The one that leads nearest is taken, shortened if neither does. `None` if
     /// none was found.
     fn nearer<const N: usize>(

@@ -89,7 +89,7 @@ impl Default for WorkLimit {
     }
 }
 
-/// WorkStep that may exceed the limit.
+/// Step of the work that may exceed the limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WorkStep {
     /// Values of the model at the random points that are tried.

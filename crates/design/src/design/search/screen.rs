@@ -544,7 +544,7 @@ mod tests {
             accelerometer_noise_g: [1e-7, 1e-5, 1e-3][below(3)],
             ..Conditions::default()
         };
-        if task % 3 == 0 {
+        if task.is_multiple_of(3) {
             let known = [("D", [0.01, 1.0][below(2)]), ("psi", 1e-3), ("psi_y", 1e-5)];
             let stated = known.map(|(name, value)| Assignment { name: name.into(), value });
             conditions.priors.extend(stated.into_iter().take(1 + below(3)));
