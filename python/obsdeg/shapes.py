@@ -133,9 +133,9 @@ Decimals, rounded to six places (small ones to six digits).
 """
 
 FoundBy = Literal["prime_fields", "symbolic_engine", "floating_point"]
-"""Source of the coefficients of a solution. prime_fields: Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6` recovered from their images in
-two prime fields. symbolic_engine: Formulas in sines and cosines, solved by the symbolic engine; their images in the prime fields are
-the same. floating_point: Decimals from floating-point arithmetic.
+"""Source of the coefficients of a solution. prime_fields: Numbers `a + b sqrt 2 + c sqrt 3 + d sqrt 6`, and these times short products
+of sines and cosines, recovered from their images in two prime fields. symbolic_engine: Formulas in sines and cosines, solved by the
+symbolic engine; their images in the prime fields are the same. floating_point: Decimals from floating-point arithmetic.
 """
 
 Verification = Literal["symbolic", "modular", "numeric"]
@@ -1223,6 +1223,10 @@ class SystemAnalysis(Shape):
     """Highest order of derivatives that was examined."""
     bound: int
     """Order of derivatives at which the search ends at the latest."""
+    discrete: bool | None
+    """True for a model in discrete time: orders and degrees count steps, `y[t+1]`, instead of derivatives. Left out for a model in
+    continuous time.
+    """
     closed: bool
     """True if the end is proven: an order that adds nothing is the last. If false, unobservable verdicts hold up to the bound on the
     order only.

@@ -23,7 +23,10 @@ fn same(with: &str, by_hand: &str) {
     let both: Vec<&String> = expected.keys().filter(|name| with_verdicts.contains_key(*name)).collect();
     assert!(both.len() > 1, "{with}\n{by_hand}");
     for name in both {
-        assert_eq!(with_verdicts[name], expected[name], "{name} of\n{with}\n{by_hand}");
+        let (found, expected) = (&with_verdicts[name], &expected[name]);
+        // what moves no output may still move an algebraic unknown, which is an unknown of this model
+        let moves_one = expected.0 == "not excited" && found == &("inseparable".to_string(), None);
+        assert!(found == expected || moves_one, "{name}: {found:?}, {expected:?} of\n{with}\n{by_hand}");
     }
 }
 
@@ -170,6 +173,11 @@ fn equations_and_refusals() {
         model(head, "x = \"-z\"", &format!("z = \"{equation}\""), &["p"], "y = \"x\"")
     };
     refused(&one("", "x - p"), "index 1");
+    refused(&one("", "0*z - x"), "index 1");
+    refused(
+        &model("", "x = \"-z\"", "z = { equation = \"z - x\", initial = \"5\" }", &[], "y = \"x\""),
+        "a start",
+    );
     refused(&one("", "z - sin(x)"), "a function");
     refused(&one("", "z - t*x"), "time");
     refused(&one("", "z - x^p"), "power");

@@ -131,6 +131,39 @@ fn solutions_are_counted() {
     assert!(solution.contains("y[t+1]") && solution.contains('y'), "{solution}");
 }
 
+/// Later steps leave fewer solutions than those that make all observable: no number above one is given.
+#[test]
+fn more_solutions_than_one_are_not_claimed() {
+    // x = (y[t+1] - y - 1)/2, of the second x = z = ... by y[t+2] = (x + 1)^2
+    for states in [&[("x", "x + 1")][..], &[("x", "z"), ("z", "x + 1")]] {
+        let a = analyzed(&model(states, &[("y", "x^2")], &[], ""));
+        for q in &a.quantities {
+            assert_eq!(q.identifiability, Identifiability::GloballyIdentifiable, "{q:?}");
+        }
+        assert!(a.solution_maps.is_empty());
+    }
+    let a = analyzed(&model(&[("z", "2*z*z")], &[("y", "z/(2 + z*z)")], &[], ""));
+    assert!(
+        a.quantities.iter().all(|q| !matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(2..))))
+    );
+}
+
+/// Unobservable directions that contain later values of an input, or states of several experiments.
+#[test]
+fn combinations_of_later_names() {
+    let a = analyzed(
+        "name = \"m\"\ndiscrete = true\nunknown_inputs = { w = \"arbitrary\" }\n[states]\nx = \"x\"\n\
+         [outputs]\ny = \"x + w\"\n",
+    );
+    assert_eq!(degrees(&a), [("x", None), ("w", None)]);
+    let a = analyzed(
+        "name = \"m\"\ndiscrete = true\nexperiments = 2\nparameters = [\"a\"]\n[states]\nx = \"x\"\n\
+         [outputs]\ny = \"a*x\"\n",
+    );
+    assert_eq!(degrees(&a), [("x@1", None), ("x@2", None), ("a", None)]);
+    assert!(a.quantities.iter().all(|q| q.status == Status::Inseparable), "{:?}", a.quantities);
+}
+
 /// Echelon form over the integers modulo a small prime: dimension and membership.
 struct Span {
     rows: Vec<Vec<u64>>,

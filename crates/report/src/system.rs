@@ -239,12 +239,15 @@ fn assumed(a: &SystemAnalysis) -> Vec<String> {
             .into()
     }));
     assumed.push(if a.discrete { last_step(a) } else { last_order(a) });
-    assumed.push(
+    let (up_to, further) = match a.discrete {
+        true => ("step", "outputs of later steps"),
+        false => ("order", "derivatives of higher orders"),
+    };
+    assumed.push(format!(
         "observable and degree are meant locally: around a generic point no other value gives the same \
-         outputs up to that order; how many values there are in all is said where it was decided, and \
-         the expression of an only one may use derivatives of higher orders"
-            .into(),
-    );
+         outputs up to that {up_to}; how many values there are in all is said where it was decided, and \
+         the expression of an only one may use {further}"
+    ));
     if !a.branches.is_empty() {
         assumed.push(branch(a));
     }
@@ -330,16 +333,19 @@ fn chosen_factor(w: &ConstraintFactor) -> String {
 
 /// Sentence on the last step in discrete time that was looked at.
 fn last_step(a: &SystemAnalysis) -> String {
-    let last = a.last_order;
+    let last = match a.last_order {
+        0 => String::new(),
+        k => format!("+{k}"),
+    };
     if a.closed {
-        format!("outputs up to t+{last} were looked at, and those of later steps add nothing")
+        format!("outputs up to t{last} were looked at; those of later steps make nothing more observable")
     } else if a.rests_on_bound {
         format!(
-            "outputs up to t+{last} were looked at, and what is not observable rests on this bound (--order sets \
+            "outputs up to t{last} were looked at, and what is not observable rests on this bound (--order sets \
              another)"
         )
     } else {
-        format!("everything is observable with outputs up to t+{last}")
+        format!("everything is observable with outputs up to t{last}")
     }
 }
 

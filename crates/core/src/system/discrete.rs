@@ -364,13 +364,26 @@ fn degrees(
     let mut out =
         StepDegrees { unknowns: vec![None; names.len()], combinations: vec![None; whole.combinations.len()] };
     for step in 0..=last {
-        let part = SystemModel { combinations: whole.combinations.clone(), ..model.unrolled(step)? };
+        let mut part = model.unrolled(step)?;
+        let known: HashSet<String> =
+            part.slot_names().into_iter().chain(part.definitions.iter().map(|d| d.0.clone())).collect();
+        // what names a later input is not known by the outputs so far
+        let named = |c: &PlacedExpression| {
+            c.expression.nodes.iter().all(|node| match node {
+                Node::Name(name) => known.contains(name) || matches!(name.as_str(), "pi" | "deg"),
+                _ => true,
+            })
+        };
+        let asked: Vec<usize> =
+            (0..whole.combinations.len()).filter(|&c| named(&whole.combinations[c])).collect();
+        part.combinations = asked.iter().map(|&c| whole.combinations[c].clone()).collect();
         let at = judge(&part, seed, None)?;
         for (degree, name) in out.unknowns.iter_mut().zip(&names) {
             let seen = at.verdict(&part, name).is_some_and(|v| v.degree.is_some());
             *degree = degree.or(seen.then_some(step));
         }
-        for (degree, verdict) in out.combinations.iter_mut().zip(at.asked()) {
+        for (&c, verdict) in asked.iter().zip(at.asked()) {
+            let degree = &mut out.combinations[c];
             *degree = degree.or(verdict.degree.map(|_| step));
         }
     }
@@ -387,7 +400,9 @@ pub(super) fn analyze_discrete(
 ) -> Result<SystemAnalysis, ModelError> {
     let Steps { ranks, ended, error_bound } = steps(model, options.order, options.seed)?;
     let last = ranks.len() - 1;
-    let mut whole = model.unrolled(last)?;
+    // a further step may leave fewer solutions
+    let further = last + 1;
+    let mut whole = model.unrolled(further)?;
     let Analyzed { analysis: mut out, judged, functions } =
         analyzed(&whole, SystemOptions { order: None, ..options })?;
     let asked = whole.combinations.len();
@@ -395,25 +410,28 @@ pub(super) fn analyze_discrete(
         Some(u) => u.name.clone(),
         None => whole.constants[c - judged.layout.unknowns.len()].0.name.clone(),
     };
-    let functions: Vec<PlacedExpression> = functions.iter().map(|terms| sum(terms, &name)).collect();
+    // combinations are those of the first experiment, where names have no number
+    let plain = |c: usize| name(c).trim_end_matches("@1").to_string();
+    let functions: Vec<PlacedExpression> = functions.iter().map(|terms| sum(terms, &plain)).collect();
     whole.combinations.extend(functions);
     let found = degrees(model, (&whole, &judged), last, options.seed)?;
     for q in &mut out.quantities {
         let place = judged.layout.unknowns.iter().position(|u| u.name == q.name);
         q.degree = place.and_then(|c| found.unknowns[c]);
-        if let Some(NumberOfSolutions::Counted(k)) =
-            q.number_of_solutions.as_ref().filter(|_| !ended || last > 0)
-            && *k > 1
-        {
-            let reason =
-                format!("{k} solutions of the outputs up to t+{last}; those of later steps may leave fewer");
-            q.number_of_solutions = Some(NumberOfSolutions::Undecided(reason));
-        }
+        q.number_of_solutions = q.number_of_solutions.take().map(|n| at_most(n, further));
     }
+    for c in &mut out.invariants {
+        c.number_of_solutions = c.number_of_solutions.take().map(|n| at_most(n, further));
+    }
+    // a map of solutions is one as far as the outputs were looked at
+    out.solution_maps.clear();
     let (own, rest) = found.combinations.split_at(asked);
     for (c, degree) in out.combinations.iter_mut().zip(own).chain(out.invariants.iter_mut().zip(rest)) {
         c.degree = *degree;
     }
+    let listed = out.invariants.len();
+    out.invariants.retain(|c| c.degree.is_some());
+    out.missing_functions += listed - out.invariants.len();
     out.rests_on_bound = !ended && out.rank < out.unknowns;
     for q in out.quantities.iter_mut() {
         if out.rests_on_bound && q.degree.is_none() {
@@ -427,7 +445,7 @@ pub(super) fn analyze_discrete(
     }
     (out.rank_profile, out.error_bound) = (ranks, error_bound.zip(out.error_bound).map(|(a, b)| 2.0 * a + b));
     out.equations = model.equations();
-    out.counting_order = out.counting_order.map(|_| last);
+    out.counting_order = out.counting_order.map(|_| further);
     out.time = (!model.time_is_generic()).then(|| model.time.number().to_string());
     if out.quantities.iter().any(|q| q.degree.is_none()) {
         let text = "known values and outputs: none is tried for a model in discrete time".into();
@@ -435,8 +453,18 @@ pub(super) fn analyze_discrete(
     }
     let own = model.slot_names();
     out.quantities.retain(|q| own.iter().any(|name| q.name.split('@').next() == Some(name)));
-    renew_names(&mut out, model, last);
+    renew_names(&mut out, model, further);
     Ok(out)
+}
+
+/// Number of solutions, if more than one as far as outputs up to `step` leave them.
+fn at_most(number: NumberOfSolutions, step: usize) -> NumberOfSolutions {
+    match number {
+        NumberOfSolutions::Counted(k) if k > 1 => NumberOfSolutions::Undecided(format!(
+            "{k} solutions of the outputs up to t+{step}; those of later steps may leave fewer"
+        )),
+        number => number,
+    }
 }
 
 /// Writes `w[t+2]` for the names of later quantities in all texts of an answer.

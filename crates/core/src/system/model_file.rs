@@ -464,6 +464,10 @@ impl ModelReader<'_> {
             model.states.extend(self.states(base(key), value)?);
         }
         for (key, value) in algebraic {
+            if value.get_ref().as_table().is_some_and(|t| t.contains_key("initial")) {
+                let message = "a start of an algebraic unknown; expected none, since its equation gives it";
+                return Err(self.at(value.span(), format!("the equation of {}", base(key)), message.into()));
+            }
             let equation = |s: State| AlgebraicEquation { named: s.named, equation: s.equation };
             model.algebraic.extend(self.states(base(key), value)?.into_iter().map(equation));
         }
