@@ -65,7 +65,7 @@ pub(crate) fn position_to_drop(r: &ComparedScheme) -> Option<String> {
 /// The answer on a scheme, then a line for each group of unknowns that is not observable.
 pub(crate) fn of_scheme(a: &Analysis) -> Vec<String> {
     let all = a.quantities.iter().map(|q| (q.name.as_str(), q.degree)).collect();
-    let mut answer = UnknownDegrees { all, constrained: false }.answer(&a.to_resolve, "");
+    let mut answer = UnknownDegrees { all, constrained: false, discrete: false }.answer(&a.to_resolve, "");
     let lost = a.quantities.iter().filter(|q| q.degree.is_some() && q.accuracy_order.is_none());
     let lost: Vec<&str> = lost.filter(|_| a.has_accuracy_orders).map(|q| q.name.as_str()).collect();
     if !lost.is_empty() {
@@ -89,8 +89,8 @@ pub(crate) fn of_model(a: &SystemAnalysis) -> Vec<String> {
     let all = a.quantities.iter().map(|q| (q.name.as_str(), q.degree)).collect();
     let unproven = a.quantities.iter().any(|q| q.status == Status::NotSeen);
     let upto = if unproven { format!(" up to order {}", a.last_order) } else { String::new() };
-    let mut answer =
-        UnknownDegrees { all, constrained: !a.constraints.is_empty() }.answer(&a.to_resolve, &upto);
+    let mut answer = UnknownDegrees { all, constrained: !a.constraints.is_empty(), discrete: a.discrete }
+        .answer(&a.to_resolve, &upto);
     let several = a.quantities.iter().filter_map(|q| match q.number_of_solutions {
         Some(NumberOfSolutions::Counted(k)) if k > 1 => Some(q.name.as_str()),
         _ => None,
@@ -126,6 +126,8 @@ struct UnknownDegrees<'a> {
     all: Vec<(&'a str, Option<usize>)>,
     /// True if constraints on the unknowns add to the outputs.
     constrained: bool,
+    /// True if degrees count steps.
+    discrete: bool,
 }
 
 impl UnknownDegrees<'_> {
@@ -144,6 +146,7 @@ impl UnknownDegrees<'_> {
             let from = if self.constrained { "the outputs and the constraints" } else { "the outputs" };
             return match order {
                 0 => format!("{subject} by {from} themselves"),
+                k if self.discrete => format!("{subject} with outputs up to t+{k}"),
                 k => format!("{subject} with derivatives up to order {k}"),
             };
         }

@@ -280,10 +280,16 @@ fn judged_at(a: &SystemAnalysis, time: &str) -> String {
         "generic" => format!("a generic time (verdicts of almost every time{})", side_in_time(a)),
         time => format!("t = {time}, where the run begins"),
     };
+    let later = match a.discrete {
+        true => String::new(),
+        false => {
+            let side = if time == "generic" { String::new() } else { side_in_time(a) };
+            format!("; segments after the first, if there are any, at a generic time{side}")
+        }
+    };
     format!(
-        "the equations or known inputs depend on the time: judged at {at}; segments after the first, \
-         if there are any, at a generic time{}; `time` in the file sets another, or \"generic\"",
-        if time == "generic" { String::new() } else { side_in_time(a) }
+        "the equations or known inputs depend on the time: judged at {at}{later}; `time` in the file sets \
+         another, or \"generic\""
     )
 }
 

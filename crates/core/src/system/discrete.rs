@@ -448,7 +448,7 @@ pub(super) fn analyze_discrete(
     out.counting_order = out.counting_order.map(|_| further);
     out.time = (!model.time_is_generic()).then(|| model.time.number().to_string());
     if out.quantities.iter().any(|q| q.degree.is_none()) {
-        let text = "known values and outputs: none is tried for a model in discrete time".into();
+        let text = "known values and outputs, in discrete time".into();
         out.to_resolve = Remedies { not_tried: vec![text], ..Remedies::default() };
     }
     let own = model.slot_names();
