@@ -223,7 +223,7 @@ def test_discrete_time(tmp_path: Path) -> None:
     )"""
     path = tmp_path / "sir.jl"
     path.write_text(text, encoding="utf-8")
-    found = obsdeg.analyze(load(path))
+    found = obsdeg.analyze(obsdeg.load(path))
     assert found.statuses == {"S": "observable", "I": "observable", "R": "not_excited", "α": "observable", "β": "observable"}
     # I[t+1]/I is 1 + βS - α; of the next quotients one gives β^2 S, the other β
     assert found.degrees == {"S": 3, "I": 0, "R": None, "α": 3, "β": 3}
