@@ -178,7 +178,8 @@ def to_xarray(rows: pandas.DataFrame, dims: Sequence[str] | None = None) -> xarr
         found = f"task {missing.idxmax()} without a value of {', '.join(dims)}"
         raise ValueError(f"dims: found {found}; expected one of each")
     if (double := tasks.duplicated(list(dims), keep=False)).any():
-        same = " and ".join(map(str, tasks.index[double][:2]))
+        alike = next(iter(tasks[double].groupby(list(dims), sort=False).groups.values()))
+        same = " and ".join(map(str, alike[:2]))
         raise ValueError(f"dims: found tasks {same} with the same {', '.join(dims)}; expected different ones")
     judged = rows[rows["name"].notna()]
     of_tasks = tasks[[name for name in ("rank", "error") if name in rows]].astype({"rank": "float64"})

@@ -29,8 +29,9 @@ def run(module: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[dict
             asked.append(options)
             super().__init__(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None)
 
-        def scale(self, **options: Any) -> None:
-            asked.append(options)
+        def scale(self, *numbers: Any, **options: Any) -> Any:
+            # numbers are those of the local cluster itself
+            return super().scale(*numbers, **options) if numbers else asked.append(options)
 
     stand_in = ModuleType(module)
     setattr(stand_in, CLUSTERS[module], Local)

@@ -128,6 +128,7 @@ RARE = {
     "ConditionsReport.accelerometer_bias", "ConditionsReport.settle_s", "Design.gimbals", "Geometry.accelerometers",
     "MeasurementReport.accelerometer_bias", "MeasurementReport.gyro_noise", "MeasurementReport.settle_s",
     "NextPositions.unused_ageing", "OtherCarry.not_judged", "Review.gimbals", "Review.noise_floor", "SearchReport.ranked",
+    "SystemAnalysis.discrete",
 }
 
 
