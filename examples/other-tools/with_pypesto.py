@@ -31,7 +31,7 @@ class Gate(NamedTuple):
 
 
 def gate(problem: Path) -> Gate:
-    """What stands in the way of a fit, and how it is removed."""
+    """Parameters that a fit cannot determine, and the remedy of each."""
     model = obsdeg.Model(obsdeg.load(problem))
     parameters = list(model.parameters)
     answer = obsdeg.analyze(model)

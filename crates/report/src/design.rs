@@ -195,7 +195,7 @@ fn gimbal_angles(f: &Found) -> DocumentBlock {
     DocumentBlock::table("Gimbal angles of the first [deg]", columns, rows)
 }
 
-/// How the schemes were found and ordered, one sentence each.
+/// Sentences on the search and the order of the schemes.
 fn how(d: &Design, s: &SearchReport) -> Vec<String> {
     let mut out = vec![searched_how(d, s)];
     out.extend(s.parts.as_ref().map(parts));
