@@ -349,6 +349,13 @@ fn refusals() {
         assert_eq!(out.status.code(), Some(2), "{said}");
         assert!(said.contains("discrete time") && said.contains("analyze"), "{command}: {said}");
     }
+    for option in ["--why", "--certificate", "--reduced"] {
+        let file = path.to_str().expect("a path");
+        let out = crate::program::run(&["analyze", "--model", file, option, "x"]);
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert_eq!(out.status.code(), Some(2), "{said}");
+        assert!(said.contains(&format!("{option}: the model is in discrete time")), "{said}");
+    }
     let out = run("analyze");
     let said = String::from_utf8_lossy(&out.stdout).into_owned();
     assert!(

@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 use crate::arguments::{ANY, InputOptions, SEED, Word, check_whole, one_of, whole};
 use crate::host::{Host, Now};
 use crate::problem::Problem;
-use crate::source::{Input, Named};
+use crate::source::{Input, ModelWithText, Named};
 
 /// Request of `analyze`: the input, and the options of its verdicts and solutions.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
@@ -292,10 +292,13 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
 pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
     let text = match read {
         [(_, Input::Scheme(scheme))] => certify(scheme, options.seed)?.text(),
-        [(_, Input::Model(file))] => match certify_model(&file.model, options.seed) {
-            Err(CertificateError::Model(e)) => return Err(file.wrong(&e)),
-            certified => certified?.text(),
-        },
+        [(_, Input::Model(file))] => {
+            in_continuous_time(file, "--certificate")?;
+            match certify_model(&file.model, options.seed) {
+                Err(CertificateError::Model(e)) => return Err(file.wrong(&e)),
+                certified => certified?.text(),
+            }
+        }
         _ => return Err(Problem::input("a certificate is of one scheme or model; found several files")),
     };
     let text = text.map_err(|e| Problem::internal(e.to_string()))?;
@@ -311,10 +314,21 @@ pub fn reduced_model(options: &Analyze, read: &[Named]) -> Result<File, Problem>
     let [(_, Input::Model(file))] = read else {
         return Err(Problem::input("a reduced model is of one model"));
     };
+    in_continuous_time(file, "--reduced")?;
     match reduced(&file.model, options.seed, options.order.map(|order| order as usize)) {
         Ok(found) => Ok(File { name: "reduced.toml".into(), bytes: found.text.into_bytes() }),
         Err(ReducedError::Model(e)) => Err(file.wrong(&e)),
         Err(e) => Err(Problem::input(e.to_string())),
+    }
+}
+
+/// Refuses an option for a model in discrete time.
+fn in_continuous_time(file: &ModelWithText, option: &str) -> Result<(), Problem> {
+    match file.model.discrete {
+        true => Err(Problem::input(format!(
+            "{option}: the model is in discrete time; expected one in continuous time"
+        ))),
+        false => Ok(()),
     }
 }
 
@@ -379,6 +393,9 @@ fn judge(options: &Analyze, input: &Input, host: &mut Host<'_>) -> Result<Judged
             let count_limit = count_limit.unwrap_or(COUNT_LIMIT);
             let relation_limit = relation_limit.unwrap_or(RELATION_LIMIT);
             let order = order.map(Into::into);
+            if !why.is_empty() {
+                in_continuous_time(file, "--why")?;
+            }
             let options = SystemOptions { seed, solutions, count_limit, relation_limit, order };
             let mut found = analyze_system(&file.model, options).map_err(|e| file.wrong(&e))?;
             let names: Vec<String> = found.quantities.iter().map(|q| q.name.clone()).collect();

@@ -400,11 +400,10 @@ pub(super) fn analyze_discrete(
 ) -> Result<SystemAnalysis, ModelError> {
     let Steps { ranks, ended, error_bound } = steps(model, options.order, options.seed)?;
     let last = ranks.len() - 1;
-    // a further step may leave fewer solutions
-    let further = last + 1;
-    let mut whole = model.unrolled(further)?;
-    let Analyzed { analysis: mut out, judged, functions } =
-        analyzed(&whole, SystemOptions { order: None, ..options })?;
+    let mut whole = model.unrolled(last)?;
+    let options_of_steps = SystemOptions { order: None, ..options };
+    let Analyzed { analysis: mut out, judged, functions } = analyzed(&whole, options_of_steps)?;
+    let further = recount(model, &mut out, last, options_of_steps)?;
     let asked = whole.combinations.len();
     let name = |c: usize| match judged.layout.unknowns.get(c) {
         Some(u) => u.name.clone(),
@@ -418,10 +417,6 @@ pub(super) fn analyze_discrete(
     for q in &mut out.quantities {
         let place = judged.layout.unknowns.iter().position(|u| u.name == q.name);
         q.degree = place.and_then(|c| found.unknowns[c]);
-        q.number_of_solutions = q.number_of_solutions.take().map(|n| at_most(n, further));
-    }
-    for c in &mut out.invariants {
-        c.number_of_solutions = c.number_of_solutions.take().map(|n| at_most(n, further));
     }
     // a map of solutions is one as far as the outputs were looked at
     out.solution_maps.clear();
@@ -457,14 +452,53 @@ pub(super) fn analyze_discrete(
     Ok(out)
 }
 
-/// Number of solutions, if more than one as far as outputs up to `step` leave them.
-fn at_most(number: NumberOfSolutions, step: usize) -> NumberOfSolutions {
-    match number {
-        NumberOfSolutions::Counted(k) if k > 1 => NumberOfSolutions::Undecided(format!(
-            "{k} solutions of the outputs up to t+{step}; those of later steps may leave fewer"
-        )),
-        number => number,
+/// Counts with the outputs of one more step, which may leave fewer solutions, where those up to `last` leave
+/// more than one or do not decide. Returns the last step of the outputs that were counted with.
+fn recount(
+    model: &SystemModel,
+    out: &mut SystemAnalysis,
+    last: usize,
+    options: SystemOptions,
+) -> Result<usize, ModelError> {
+    use NumberOfSolutions::{Counted, OneByExpression};
+    let left = |n: &Option<NumberOfSolutions>| {
+        n.as_ref().is_some_and(|n| !matches!(n, Counted(1) | OneByExpression))
+    };
+    let unknowns = out.quantities.iter().any(|q| left(&q.number_of_solutions));
+    if !unknowns && !out.invariants.iter().any(|c| left(&c.number_of_solutions)) {
+        return Ok(last);
     }
+    let further = last + 1;
+    let more = analyzed(&model.unrolled(further)?, options)?.analysis;
+    for q in out.quantities.iter_mut().filter(|q| left(&q.number_of_solutions)) {
+        let again = more.quantities.iter().find(|other| other.name == q.name);
+        fewer(&mut q.number_of_solutions, again.and_then(|q| q.number_of_solutions.clone()), last);
+    }
+    for c in out.invariants.iter_mut().filter(|c| left(&c.number_of_solutions)) {
+        let again = more.invariants.iter().find(|other| other.expression == c.expression);
+        fewer(&mut c.number_of_solutions, again.and_then(|c| c.number_of_solutions.clone()), last);
+    }
+    out.error_bound = out.error_bound.zip(more.error_bound).map(|(a, b)| a + b);
+    Ok(further)
+}
+
+/// Takes the number of solutions of the outputs up to `last + 1` where it is smaller or the first is not
+/// known. More than one solution is no verdict: the outputs of later steps may leave fewer.
+fn fewer(number: &mut Option<NumberOfSolutions>, again: Option<NumberOfSolutions>, last: usize) {
+    use NumberOfSolutions::{Counted, OneByExpression, Undecided};
+    let (k, step) = match (&*number, &again) {
+        (_, Some(Counted(1) | OneByExpression)) => {
+            *number = again;
+            return;
+        }
+        (Some(Counted(k)), Some(Counted(l))) if l > k => (*k, last),
+        (_, Some(Counted(l))) => (*l, last + 1),
+        (Some(Counted(k)), _) => (*k, last),
+        _ => return,
+    };
+    *number = Some(Undecided(format!(
+        "{k} solutions of the outputs up to t+{step}; those of later steps may leave fewer"
+    )));
 }
 
 /// Writes `w[t+2]` for the names of later quantities in all texts of an answer.
