@@ -302,7 +302,6 @@ fn samples_that_the_record_leaves_out_count_nowhere() {
     let cases = [
         ("inertial", slews, ""),
         ("inertial", "", "[bench]\nK0 = 20\nlatitude = 10\n"),
-        ("platform", "drift_noise = '0.001 deg/sqrt(h)'\n", ""),
         ("platform", "accelerometer_bias_instability_ug = 2\n", ""),
     ];
     for (carry, conditions, bench) in cases {

@@ -115,8 +115,8 @@ fn assert_status(page: &Html, verdict: &str) {
 }
 
 #[test]
-fn every_fourth_example_has_a_report() {
-    have_reports(4);
+fn every_eighth_example_has_a_report() {
+    have_reports(8);
 }
 
 /// Reports of all examples: a minute.

@@ -180,11 +180,11 @@ fn a_thousand_right_records_raise_few_alarms() {
 
 /// With stated priors, and with a calibration before, chi-square is its degrees of freedom on average: of few
 /// measurements priors are a part that counts (30 priors beside 120 measurements). Correlations of residuals
-/// are those of chance, though the estimate has one unknown for four measurements: of 24 probabilities at
-/// most 8 are below 0.1, of 48 at most 12 (binomial, 99.9 %).
+/// are those of chance, though the estimate has one unknown for four measurements: of 12 probabilities at
+/// most 5 are below 0.1, of 48 at most 12 (binomial, 99.9 %).
 #[test]
 fn priors_count_in_chi_square() {
-    priors_count(12, 8);
+    priors_count(6, 5);
 }
 
 #[test]

@@ -319,7 +319,7 @@ fn refuse(count: usize, seed: u64) {
 
 #[test]
 fn both_checkers_refuse_single_changes() {
-    refuse(30, 7);
+    refuse(10, 7);
 }
 
 #[test]

@@ -244,8 +244,8 @@ fn check_front(small: &Small, found: &Design, task: usize) {
 
 #[test]
 fn no_total_is_below_that_of_a_design() {
-    let [found, other] = benched(9, 36);
-    assert!(found > 4 && other > 0, "{found} {other}");
+    let [found, other] = benched(5, 36);
+    assert!(found > 2 && other > 0, "{found} {other}");
 }
 
 #[test]
@@ -397,8 +397,8 @@ fn immune(count: usize, seed: u64) -> [usize; 3] {
 
 #[test]
 fn immune_designs_are_those_of_ranks() {
-    let [found, none, other] = immune(16, 7);
-    assert!(found > 2 && none > 2 && other > 0, "{found} {none} {other}");
+    let [found, none, other] = immune(8, 7);
+    assert!(found > 1 && none > 1 && other > 0, "{found} {none} {other}");
 }
 
 #[test]
