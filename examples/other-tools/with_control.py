@@ -60,8 +60,8 @@ def main() -> dict[str, Compared]:
     for name, system in cases.items():
         found[name], answer = compared(system)
         print(f"{name:<16}{system.nstates:<8}{found[name].numeric:<22}{found[name].exact}")
-        for combination in answer.combinations:
-            print(f"{'':<16}observable instead: {combination.expression}")
+        for function in answer.invariants:
+            print(f"{'':<16}observable instead: {function.expression}")
     return found
 
 

@@ -58,8 +58,8 @@ def main() -> dict[str, dict[str, Compared]]:
         found[name] = {state: Compared(answer[state].status, answer[state].degree, bounds[state]) for state in START}
         for state, (status, degree, sigma) in found[name].items():
             print(f"{name:<14}{state:<7}{status:<14}{'-' if degree is None else degree:<8}{sigma:.3g}")
-        for combination in answer.combinations:
-            print(f"{'':<14}observable instead: {combination.expression}")
+        for function in answer.invariants:
+            print(f"{'':<14}observable instead: {function.expression}")
     return found
 
 

@@ -36,7 +36,7 @@ def gate(problem: Path) -> Gate:
     parameters = list(model.parameters)
     answer = obsdeg.analyze(model)
     open_, fix = [name for name in parameters if answer[name].status != "observable"], []
-    combine = [c.expression for c in answer.combinations]
+    combine = [c.expression for c in answer.invariants]
     left = open_
     while left:
         fix.append(left[0])
