@@ -79,6 +79,10 @@ def checked(task: Any, number: int, reserved: Container[str]) -> tuple[dict[str,
     tags = task.get("tags")
     if tags is not None and not isinstance(tags, Mapping):
         raise ValueError(f"task number {number}: found the tags {_short(tags)}; expected values by name")
+    for name in tags or ():
+        if not isinstance(name, str) or name in reserved or name in task:
+            expected = "a name of its own, since an option or a column of results has this one"
+            raise ValueError(f"task number {number}: found the tag {_short(name)}; expected {expected}")
     try:
         text = written(task)
         held = json.loads(text)

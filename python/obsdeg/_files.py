@@ -54,6 +54,11 @@ def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:
     return text
 
 
+def file_name(name: str | None, kind: str) -> str:
+    """Name of the text of a scheme or model, by which answers call it: that of its key `name`, if it has one."""
+    return f"{' '.join(str(name).replace('/', '-').split()) if name else kind}.toml"
+
+
 class Text:
     """A text with a name, the base of :class:`Scheme` and :class:`Model`. It is immutable.
 

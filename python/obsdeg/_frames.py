@@ -59,6 +59,8 @@ def arrays(
         return None
     if f is not None and outputs is not None:
         raise TypeError("found f and outputs; expected f=... of a scheme, or outputs={...} of a model")
+    if outputs is not None and not isinstance(outputs, Mapping):
+        raise TypeError(f"outputs: found a {type(outputs).__name__}; expected values by the name of an output, as in outputs={{'y': values}}")
     columns: dict[str, Any] = {}
     sources: list[Any] = [f] if f is not None else list((outputs or {}).values())
     if t is None:

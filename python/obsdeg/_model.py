@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ._files import Text
+from ._files import Text, file_name
 from ._texts import exact, toml
 
 #: Name that is neither a function nor part of a number.
@@ -83,6 +83,12 @@ class Model(Text):
         definitions: Mapping[Any, Any] | None = None,
         **keys: Any,
     ) -> None:
+        for part, found in (("outputs", outputs), ("starts", starts), ("constants", constants), ("definitions", definitions)):
+            if found is not None and not isinstance(found, Mapping):
+                raise TypeError(f"{part}: found {found!r} of type {type(found).__name__}; expected a dictionary, as in {part}={{'y': 'x'}}")
+        if states is not None and (isinstance(states, str) or not isinstance(states, Iterable)):
+            raise TypeError(f"states: found {states!r} of type {type(states).__name__}; expected a dictionary, or a list of equations of SymPy")
+        parameters, known_inputs, unknown_inputs = _several(parameters), _several(known_inputs), _several(unknown_inputs)
         parts = dict(
             states=states,
             parameters=parameters,
@@ -102,7 +108,7 @@ class Model(Text):
         if states is None and outputs is None:
             raise TypeError("found no states and no outputs; expected states={...} and outputs={...}, or the text of a model file")
         written = _of_sympy(name, parts, keys) if _has_sympy(parts) else _written(name, parts, keys)
-        self._set(written, "model.toml")
+        self._set(written, file_name(name, "model"))
         self.check()
 
     @classmethod
@@ -120,7 +126,8 @@ class Model(Text):
         **changes
             Keys of a model file. In the tables ``states``, ``outputs``, ``constants``, ``definitions`` and
             ``simulation`` only the given entries change, and None removes an entry. Other keys are replaced,
-            and None removes a key.
+            and None removes a key. ``starts`` are known values of states at the start, as for
+            :class:`Model`. Formulas are texts, numbers or expressions of SymPy.
 
         Raises
         ------
@@ -135,10 +142,18 @@ class Model(Text):
         {'x': 'observable', 'a': 'observable', 'b': 'observable'}
         """
         data = dict(self._read())
+        if starts := changes.pop("starts", None):
+            states = {**data.get("states", {}), **{str(k): _formula(v) if _is_sympy(v) else v for k, v in changes.pop("states", {}).items()}}
+            for state, start in starts.items():
+                if str(state) not in states:
+                    raise ValueError(f"starts: found {str(state)!r}; expected a state: {', '.join(states)}")
+                before = states[str(state)]
+                states[str(state)] = {**(before if isinstance(before, Mapping) else {"equation": before}), "initial": _formula(start)}
+            changes["states"] = states
         for key, value in changes.items():
             old = data.get(key)
             if isinstance(value, Mapping) and isinstance(old, Mapping):
-                both = {**old, **{str(k): v for k, v in value.items()}}
+                both = {**old, **{str(k): _formula(v) if _is_sympy(v) else v for k, v in value.items()}}
                 data[key] = {k: v for k, v in both.items() if v is not None}
             else:
                 data[key] = value
@@ -161,6 +176,11 @@ class Model(Text):
         return tuple(self._read().get("parameters") or ())
 
 
+def _several(given: Any) -> Any:
+    """Names as a collection, also if it is a single one."""
+    return [given] if isinstance(given, str) or (given is not None and not isinstance(given, Iterable)) else given
+
+
 def _formulas(table: Mapping[str, Any], key: str) -> dict[str, str]:
     return {name: str(of[key] if isinstance(of, Mapping) else of) for name, of in table.items()}
 
@@ -178,7 +198,8 @@ def _text_of(given: Any) -> str:
 
 
 def _is_sympy(value: Any) -> bool:
-    return any(kind.__module__.partition(".")[0] == "sympy" for kind in type(value).__mro__)
+    # classes of functions such as x(t) have no module
+    return any((kind.__module__ or "").partition(".")[0] == "sympy" for kind in type(value).__mro__)
 
 
 def _has_sympy(parts: Mapping[str, Any]) -> bool:
@@ -260,6 +281,10 @@ def _formula(value: Any) -> str:
     parts = (getattr(value, "numerator", None), getattr(value, "denominator", 1))
     if isinstance(parts[0], int) and parts[1] != 1:
         return f"{parts[0]}/{parts[1]}"
+    if _is_sympy(value) and not value.is_number:
+        from .importers.formula import exactly, text_of
+
+        return text_of(exactly(value))
     return exact(value, None)
 
 

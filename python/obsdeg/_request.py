@@ -10,7 +10,7 @@ from typing import Any, Union
 from ._files import Text, Texted, read_text
 from ._model import Model
 from ._scheme import Scheme
-from ._texts import DIGITS, Attitude, Rounded, as_json, assignments, attitudes, changed, decimal, exact
+from ._texts import DIGITS, Attitude, Rounded, as_json, assignments, attitudes, changed, check_digits, decimal, exact
 
 #: Scheme, model, or path of a file with one.
 Source = Union[Scheme, Model, str, "os.PathLike[str]", Texted]
@@ -86,6 +86,8 @@ def request(options: Mapping[str, Any], digits: int | None = DIGITS, log: list[R
         log: list to which rounded numbers are added.
         files: texts of files, and lists of them; empty ones are omitted.
     """
+    if digits != DIGITS or type(digits) is not int:
+        check_digits(digits)
     asked: dict[str, Any] = {}
     for name, value in options.items():
         if value is None:

@@ -45,8 +45,8 @@ class Answer:
     def from_json(text: str) -> Answer:
         """Answer from its JSON, as :meth:`json`, a file of ``-o`` or ``--format json`` contains it.
 
-        It has attributes, names, iteration and its main table. Texts, figures and pages come from the engine
-        only and need a new for again.
+        It has attributes, names, iteration and its main table, and prints as a summary. Texts, pages and
+        files come from the engine only and need a new call.
 
         Parameters
         ----------
@@ -186,7 +186,13 @@ class Answer:
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *fields(type(self))]
 
+    def _is_read(self) -> bool:
+        """True for an answer that was read from JSON, of which there are no texts."""
+        return self._rust is None and self._asked is None
+
     def __str__(self) -> str:
+        if self._is_read():
+            return repr(self)
         table = self.text("table")
         return f"{table}\n{self._rounding()}\n" if self._rounded else table
 
@@ -198,6 +204,8 @@ class Answer:
         return str(self._dict()["schema"])
 
     def _repr_html_(self) -> str:
+        if self._is_read():
+            return f"<p>{escape(repr(self))}</p>"
         page = self._answer().fragment()
         if self._rounded:
             page += f"<p>{escape(self._rounding())}</p>"

@@ -8,8 +8,8 @@ from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal, Union, cast
 
 from . import _obsdeg
-from ._files import Text
-from ._texts import DIGITS, Attitude, Number, Rounded, as_json, attitudes, changed, exact, toml
+from ._files import Text, file_name
+from ._texts import DIGITS, Attitude, Number, Rounded, as_json, attitudes, changed, check_digits, exact, toml
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -36,7 +36,7 @@ class Scheme(Text):
         Positions: three Euler angles alpha, beta, gamma in degrees (`C_c^n = Mx My Mz`; a text names a
         generic angle), or the directions of X_p, Y_p, Z_p as letters (``"NUE"``).
     name : str
-        Name of the scheme in reports.
+        Name of the scheme in reports, comparisons and tables.
     carry : {"platform", "inertial", "reset"}, optional
         Part of psi that is carried between positions; by default "platform".
     latitude : number, optional
@@ -87,6 +87,7 @@ class Scheme(Text):
         given = angles if positions is None else positions
         if given is None or (positions is not None and angles is not None):
             raise TypeError(f"found {'no' if given is None else 'both'} positions and angles; expected a list of positions")
+        check_digits(digits)
         log: list[Rounded] = []
         data: dict[str, Any] = {"name": name or None, "carry": _carry(carry), **keys, "latitude_deg": _latitude(latitude, digits, log)}
         data = {key: value for key, value in data.items() if value is not None}
@@ -99,7 +100,7 @@ class Scheme(Text):
         lines = [f"{key} = {toml(value)}" for key, value in data.items() if key != "position"]
         for table in data["position"]:
             lines += ["[[position]]", *(f"{key} = {toml(value)}" for key, value in table.items())]
-        self._set("\n".join(lines) + "\n", "scheme.toml", rounded, None if check else data)
+        self._set("\n".join(lines) + "\n", file_name(data.get("name"), "scheme"), rounded, None if check else data)
         if check:
             self.check()
 
@@ -135,6 +136,7 @@ class Scheme(Text):
         >>> [obsdeg.analyze(pair.replace(carry=c), solutions=False).rank for c in ("platform", "inertial", "reset")]
         [8, 8, 10]
         """
+        check_digits(digits)
         log: list[Rounded] = []
         data = dict(self._read())
         if "carry" in changes:

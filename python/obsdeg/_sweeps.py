@@ -71,12 +71,16 @@ def table(
     >>> from obsdeg import campaign
     >>> rows = campaign.table(dict(angles=[(0, 0, 0), (180, 0, 0), (x, 0, 0)], tags={"x": x}) for x in (0, 30, 60))
     >>> rows[rows.status == "observable"].groupby("x").size().to_dict()
-    {0: 7, 30: 11, 60: 11}
+    {0: 7, 30: 12, 60: 12}
     """
     from .campaign import run
 
     if errors not in ("raise", "record"):
         raise ValueError(f"errors: found {errors!r}; expected 'raise' or 'record'")
+    if not callable(executor):
+        raise TypeError(f"executor: found a {type(executor).__name__}; expected a function that makes an executor, such as campaign.threads")
+    if isinstance(tasks, Mapping) or not isinstance(tasks, Iterable):
+        raise TypeError(f"tasks: found a {type(tasks).__name__}; expected a list or another iterable of mappings")
     found: dict[int, list[dict[str, Any]]] = {}
     done = 0
     for _, chunk in run(partial(_judged, record=errors == "record"), _chunks(tasks), executor=executor):
@@ -101,6 +105,11 @@ def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
     pandas.DataFrame
         Same as for :func:`table`.
 
+    Raises
+    ------
+    FileNotFoundError
+        The folder has no files of a sweep.
+
     Examples
     --------
     >>> import tempfile
@@ -112,8 +121,11 @@ def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
     """
     import pyarrow.parquet
 
+    files = sorted(Path(folder).glob("*.parquet"))
+    if not files:
+        raise FileNotFoundError(f"{os.fspath(folder)}: found no files of a sweep (*.parquet); expected the folder of one")
     by_task: dict[str, list[dict[str, Any]]] = {}
-    for file in sorted(Path(folder).glob("*.parquet")):
+    for file in files:
         names = ["task", *FOUND]
         for row in pyarrow.parquet.read_table(file, columns=names).to_pylist():
             by_task.setdefault(row.pop("task"), []).append(row)
@@ -228,8 +240,8 @@ def _asked(number: int, task: Mapping[str, Any]) -> dict[str, Any]:
     options = {name: _value(name, value) for name, value in task.items() if name not in (*WHAT, "angles")}
     given = task.get("tags")
     given = given if isinstance(given, Mapping) else {}
-    tags = {name: value.item() if hasattr(value, "item") else value for name, value in given.items()}
-    return {"task": number, **tags, **{n: v for n, v in options.items() if n not in tags}}
+    tags = {name: value.item() if hasattr(value, "item") else value for name, value in given.items() if name not in COLUMNS}
+    return {**tags, **options, "task": number} if "task" in options else {"task": number, **tags, **options}
 
 
 def _value(name: str, value: Any) -> Any:

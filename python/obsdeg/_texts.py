@@ -23,6 +23,16 @@ DIGITS = 9
 POSITIONS = 1000
 
 
+def check_digits(digits: Any) -> None:
+    """Checks the number of decimals of computed angles.
+
+    Raises:
+        ValueError: neither None nor a number from 0 to nine.
+    """
+    if digits is not None and (type(digits) is not int or not 0 <= digits <= DIGITS):
+        raise ValueError(f"digits: found {digits!r}; expected a whole number from 0 to {DIGITS}, or None")
+
+
 class Rounded(NamedTuple):
     """A number that was rounded before the verdict."""
 

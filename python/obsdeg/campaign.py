@@ -68,19 +68,28 @@ def run(
 ) -> Iterator[tuple[Any, Any]]:
     """Yields every task with its result, in the order of their ends.
 
-    Args:
-        function: called with each task; importable by the workers.
-        tasks: any objects; they are drawn when handed out, so that memory does not grow with their number.
-        executor: makes the executor.
-        retries: number of times that a task is tried again if its worker was lost or its function failed.
-            Errors of input (``ValueError``, ``TypeError``) are not tried again.
-        ahead: largest number of tasks handed out at a time; by default twice the number of workers, at least
-            8.
+    Parameters
+    ----------
+    function : callable
+        Called with each task; importable by the workers.
+    tasks : iterable
+        Any objects; they are drawn when handed out, so that memory does not grow with their number.
+    executor : callable
+        Makes the executor.
+    retries : int
+        Number of times that a task is tried again if its worker was lost or its function failed.
+        Errors of input (``ValueError``, ``TypeError``) are not tried again.
+    ahead : int, optional
+        Largest number of tasks handed out at a time; by default twice the number of workers, at
+        least 8.
 
-    Raises:
-        CampaignError: a task failed too often, no executor is available, or the scheduler of a cluster has
-            not answered for 30 s; ``pending`` lists the drawn tasks that are not finished.
-        obsdeg.ProblemError: a task is invalid; the message names it, and ``task`` is the task.
+    Raises
+    ------
+    CampaignError
+        A task failed too often, no executor is available, or the scheduler of a cluster has not
+        answered for 30 s; ``pending`` lists the drawn tasks that are not finished.
+    obsdeg.ProblemError
+        A task is invalid; the message names it, and ``task`` is the task.
     """
     check_main()
     if ahead is not None:
@@ -155,19 +164,30 @@ def design(
     """Searches in parts and merges them. Returns the answer of ``obsdeg.design(**options)`` with a report on
     the parts in ``search.parts``.
 
-    Args:
-        folder: folder of the parts; the same search in the same folder resumes them.
-        parts: number of parts.
-        checkpoint: seconds after which an unfinished part is written: the largest amount of
-            work on a part that a kill costs.
-        check: number of random blocks of the parts that are searched again at the end.
-        heard: called with the number of finished parts and the number of all parts.
-        options: options of :func:`obsdeg.design`.
+    Parameters
+    ----------
+    folder : path
+        Folder of the parts; the same search in the same folder resumes them.
+    parts : int
+        Number of parts.
+    checkpoint : float
+        Seconds after which an unfinished part is written: the largest amount of work on a part that
+        a kill costs.
+    check : int
+        Number of random blocks of the parts that are searched again at the end.
+    heard : callable, optional
+        Called with the number of finished parts and the number of all parts.
+    **options
+        Options of :func:`obsdeg.design`.
 
-    Raises:
-        CampaignError: a part failed too often, or the scheduler of a cluster does not answer.
-        obsdeg.ProblemError: invalid options.
-        OSError: a part cannot be written; the message gives its number. Other parts are kept.
+    Raises
+    ------
+    CampaignError
+        A part failed too often, or the scheduler of a cluster does not answer.
+    obsdeg.ProblemError
+        Invalid options.
+    OSError
+        A part cannot be written; the message gives its number. Other parts are kept.
     """
     check_main()
     _check("parts", parts, 1)
@@ -319,36 +339,48 @@ def sweep(
 ) -> Path:
     """Judges many schemes. Writes one row per unknown into Parquet files, which appear as they are finished.
 
-    Args:
-        folder: folder of the files, one per chunk and named by its request. Workers that see the folder write
-            them; only one sweep at a time works in it. Tasks in the folder are not judged again, whatever
-            their chunks. Tasks are equal if their options have equal values: 0, ``"0"`` and
-            ``numpy.float64(0)`` are equal. :func:`read` returns a tidy table with numbers and tags. The
-            column ``task`` contains all options of a row as JSON. Each option of the first 500 tasks is also
-            a text column; options of other tasks are columns in their own files only (pandas shows the
-            columns of one file: use ``task``).
-        tasks: options of :func:`obsdeg.analyze`, as :func:`grid` makes them; ``scheme`` is a
-            :class:`obsdeg.Scheme`, or the text of a scheme file, ``model`` a :class:`obsdeg.Model` or its
-            text; ``tags`` are additional names and values. A task with options that only
-            :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is simulated
-            too: ``sigma`` is the standard deviation at the end of the run in ``unit``, and ``outcome`` tells
-            if it comes from the samples. Without simulation these are empty.
-        chunk: number of tasks judged together; by default about 10 s of work, by measured time, with more
-            than 100 workers as much as lets ten files end in a second. Chunks become smaller towards the end
-            if the number of tasks is known: that of a list or of :func:`grid`, not that of a generator. A
-            chunk that takes twice the intended time ends early, and its other tasks are handed out again.
-        retries: number of times that tasks of a lost worker are tried again. Then the chunk is divided until
-            the responsible task is found.
-        errors: a task that cannot be judged ends the sweep and is named (``"raise"``), or gets one row with
-            the message in the column ``error`` (``"record"``), and counts as done.
-        heard: called with the number of finished tasks.
+    Parameters
+    ----------
+    folder : path
+        Folder of the files, one per chunk and named by its request. Workers that see the folder
+        write them; only one sweep at a time works in it. Tasks in the folder are not judged again,
+        whatever their chunks. Tasks are equal if their options have equal values: 0, ``"0"`` and
+        ``numpy.float64(0)`` are equal. :func:`read` returns a tidy table with numbers and tags. The
+        column ``task`` contains all options of a row as JSON. Each option of the first 500 tasks is
+        also a text column; options of other tasks are columns in their own files only (pandas shows
+        the columns of one file: use ``task``).
+    tasks : iterable
+        Options of :func:`obsdeg.analyze`, as :func:`grid` makes them; ``scheme`` is a
+        :class:`obsdeg.Scheme`, or the text of a scheme file, ``model`` a :class:`obsdeg.Model` or
+        its text; ``tags`` are additional names and values. A task with options that only
+        :func:`obsdeg.simulate` has, such as ``noise`` [g], ``dwell`` [s] or ``requirement``, is
+        simulated too: ``sigma`` is the standard deviation at the end of the run in ``unit``, and
+        ``outcome`` tells if it comes from the samples. Without simulation these are empty.
+    chunk : int, optional
+        Number of tasks judged together; by default about 10 s of work, by measured time, with more
+        than 100 workers as much as lets ten files end in a second. Chunks become smaller towards
+        the end if the number of tasks is known: that of a list or of :func:`grid`, not that of a
+        generator. A chunk that takes twice the intended time ends early, and its other tasks are
+        handed out again.
+    retries : int
+        Number of times that tasks of a lost worker are tried again. Then the chunk is divided until
+        the responsible task is found.
+    errors : {"raise", "record"}
+        A task that cannot be judged ends the sweep and is named (``"raise"``), or gets one row with
+        the message in the column ``error`` (``"record"``), and counts as done.
+    heard : callable, optional
+        Called with the number of finished tasks.
 
-    Raises:
-        CampaignError: a task failed too often, or the scheduler of a cluster does not answer; the folder
-            keeps the finished tasks, and the same sweep resumes with the rest.
-        obsdeg.ProblemError: a task is invalid; the message names it, and ``task`` is the task. The rest of
-            its chunk is kept.
-        RuntimeError: another sweep works in the folder.
+    Raises
+    ------
+    CampaignError
+        A task failed too often, or the scheduler of a cluster does not answer; the folder keeps the
+        finished tasks, and the same sweep resumes with the rest.
+    obsdeg.ProblemError
+        A task is invalid; the message names it, and ``task`` is the task. The rest of its chunk is
+        kept.
+    RuntimeError
+        Another sweep works in the folder.
     """
     check_main()
     if chunk is not None:

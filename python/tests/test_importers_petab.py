@@ -14,7 +14,7 @@ from conftest import judge, shared
 from petab_oracle import Model, Tables, observed, prepared
 from toml_numbers import Numbers, value
 
-from obsdeg.importers import ImportProblem, load
+from obsdeg.importers import ImportProblem, load, petab
 
 #: Judged problems by first author: options, number of unknowns, and the unobservable ones.
 JUDGED: dict[str, tuple[dict[str, Any], int, set[str]]] = {
@@ -87,6 +87,15 @@ def test_verdicts(name: str) -> None:
     _, unknowns, lost = JUDGED[name]
     assert answer["unknowns"] == unknowns
     assert {q["name"] for q in answer["quantities"] if q["status"] != "observable"} == lost
+
+
+def test_a_condition_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Lang_PLOSComputBiol2024 has 9,600 measurements under a condition of 124 columns
+    read = []
+    overrides = petab._Problem._overrides
+    monkeypatch.setattr(petab._Problem, "_overrides", lambda self, name: read.append(name) or overrides(self, name))
+    load(problem("Bachmann"))
+    assert len(read) > 20 and len(read) == len(set(read))
 
 
 @pytest.mark.parametrize("name", sorted(REFUSED))

@@ -390,3 +390,32 @@ def test_analyze_gives_the_changes_per_unit() -> None:
     # Z1 = psi_z + K0_X: the tilt cancels all of it, in deg per ug
     assert abs(abs(psi.per_unit) / math.degrees(1e-6) - 1) < 1e-9
     assert obsdeg.analyze([(0, 0, 0), (180, 0, 0)]).sensitivities is None
+
+
+def test_names_tell_schemes_and_models_apart() -> None:
+    several = [obsdeg.Scheme(["NUE", "NDW"], name=name, latitude=10) for name in ("Alpha", "Beta / 2")]
+    compared = obsdeg.compare(*several)
+    assert [found.name for found in compared] == ["Alpha", "Beta - 2"] and compared["Alpha"].name == "Alpha"
+    assert [s.name for s in several] == ["Alpha.toml", "Beta - 2.toml"]
+    assert several[0].replace(carry="reset").name == "Alpha.toml"
+    models = [obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"}, name=name) for name in ("one", "two")]
+    assert sorted(set(obsdeg.analyze(*models).to_frame()["file"])) == ["one.toml", "two.toml"]
+
+
+def test_an_answer_of_json_prints_as_a_summary() -> None:
+    read = obsdeg.Answer.from_json(obsdeg.analyze(["NUE"]).json())
+    assert str(read) == repr(read) == "<Analysis: 15 unknowns, rank 5>"
+    assert read._repr_mimebundle_()["text/html"] == "<p>&lt;Analysis: 15 unknowns, rank 5&gt;</p>"
+    with pytest.raises(ValueError, match="read from JSON"):
+        read.text()
+
+
+def test_models_are_replaced_in_formulas_and_starts() -> None:
+    sympy = pytest.importorskip("sympy")
+    x, k = sympy.symbols("x k")
+    decay = obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"})
+    assert decay.replace(outputs={"y": x**2}).outputs == {"y": "x^2"}
+    known = decay.replace(states={"x": -k * x**2}, starts={x: 3})
+    assert known.states == {"x": "-k*x^2"} and list(obsdeg.analyze(known).statuses) == ["k"]
+    with pytest.raises(ValueError, match="starts: found 'q'; expected a state: x"):
+        decay.replace(starts={"q": 1})

@@ -42,9 +42,12 @@ def test_pybounds_bounds_what_obsdeg_calls_observable(capsys: pytest.CaptureFixt
     assert g / 10 < found["1e-5 m/s^2"]["g"].sigma < g and found["1 m/s^2"]["g"].sigma < 0.05
 
 
-def test_the_rank_of_control_depends_on_units() -> None:
+def test_the_rank_of_control_depends_on_units(capsys: pytest.CaptureFixture[str]) -> None:
     found = example("with_control.py", "control")["main"]()
     assert {name: (of.numeric, of.exact) for name, of in found.items()} == {"end, seconds": (4, 6), "end, hours": (6, 6), "middle, hours": (3, 3)}
+    # the middle sees only the sum of two cells at equal distances
+    shown = capsys.readouterr().out.split()
+    assert [shown[i + 1 : i + 4] for i, word in enumerate(shown) if word == "instead:"] == [["T1", "+", "T5"], ["T2", "+", "T4"]]
 
 
 def test_a_gate_before_a_fit_with_pypesto() -> None:

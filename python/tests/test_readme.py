@@ -28,7 +28,7 @@ def test_pages_print_what_they_show(page: str, tmp_path: Path, monkeypatch: pyte
     assert failed.failed == 0
 
 
-@pytest.mark.parametrize("module", ["obsdeg", "obsdeg._scheme", "obsdeg._model", "obsdeg._results", "obsdeg.campaign"])
+@pytest.mark.parametrize("module", ["obsdeg", "obsdeg._scheme", "obsdeg._model", "obsdeg._results", "obsdeg._sweeps", "obsdeg.campaign"])
 def test_docstrings_print_what_they_show(module: str) -> None:
     assert doctest.testmod(importlib.import_module(module), optionflags=doctest.ELLIPSIS).failed == 0
 

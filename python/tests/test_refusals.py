@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import obsdeg
 import pytest
 from obsdeg import campaign, importers
+from obsdeg.importers import ImportProblem
 
 PAIR = [(0, 0, 0), (180, 0, 0)]
 
@@ -118,3 +120,41 @@ def test_no_record_is_said() -> None:
     model = {"name": "m", "text": 'name = "m"\n[states]\nx = "-x"\n[outputs]\ny = "x"\n'}
     with pytest.raises(obsdeg.ProblemError, match="found 0 records; expected one of a model"):
         obsdeg._obsdeg.calibrate(json.dumps({"sources": [model]}), [])
+
+
+@pytest.mark.parametrize("digits", [-1, 3.0, True, "a", 10])
+def test_digits(digits: Any) -> None:
+    message = f"digits: found {digits!r}; expected a whole number from 0 to 9, or None"
+    for call in (obsdeg.Scheme, obsdeg.analyze):
+        with pytest.raises(ValueError, match=re.escape(message)):
+            call([(0, 0, 0.1234567891)], digits=digits)
+
+
+def test_models() -> None:
+    sympy = pytest.importorskip("sympy")
+    x, k = sympy.symbols("x k")
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"states": {x: -k * x}, "outputs": [x]}, "outputs: found [x] of type list; expected a dictionary"),
+        ({"states": {"x": "-k*x"}, "outputs": "x"}, "outputs: found 'x' of type str; expected a dictionary"),
+        ({"states": sympy.Eq(x, k), "outputs": {"y": x}}, "states: found Eq(x, k) of type Equality; expected a dictionary"),
+        ({"states": {"x": "-k*x"}, "outputs": {"y": "x"}, "starts": 3}, "starts: found 3 of type int; expected a dictionary"),
+    ]
+    for keys, message in wrong:
+        with pytest.raises(TypeError, match=re.escape(message)):
+            obsdeg.Model(**keys)
+    with pytest.raises(TypeError, match="outputs: found a list; expected values by the name of an output"):
+        obsdeg.calibrate(obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"}), t=[0, 1], outputs=[1, 2])
+
+
+def test_a_function_of_time_without_a_meaning() -> None:
+    # it was an unknown constant once
+    sympy = pytest.importorskip("sympy")
+    t, k = sympy.symbols("t k")
+    x, u = sympy.Function("x"), sympy.Function("u")
+    equations = [sympy.Eq(x(t).diff(t), -k * x(t) + u(t))]
+    with pytest.raises(ImportProblem, match=re.escape("found `u(t)`, a function without a meaning; expected a state, or one of known_inputs")):
+        obsdeg.Model(states=equations, outputs={"y": x(t)})
+    of_inputs = [obsdeg.analyze(obsdeg.Model(states=equations, outputs={"y": x(t)}, **{kind: [u(t)]})) for kind in ("known_inputs", "unknown_inputs")]
+    assert [answer.statuses["k"] for answer in of_inputs] == ["observable", "not_seen"]
+    # functions as keys
+    assert obsdeg.analyze(obsdeg.Model(states={x(t): -k * x(t)}, outputs={"y": x(t)})).degrees == {"x": 0, "k": 1}

@@ -129,3 +129,23 @@ def test_without_xarray_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ImportError, match="package `xarray`, which is not installed"):
         campaign.to_xarray(pandas.DataFrame())
+
+
+def test_tags_have_names_of_their_own() -> None:
+    for name in ("rank", "task", "error", "latitude"):
+        task = dict(angles=[(0, 0, 0)], latitude=28, tags={name: 3})
+        with pytest.raises(ValueError, match=f"task number 0: found the tag '{name}'; expected a name of its own"):
+            campaign.table([task], errors="raise")
+        (row,) = campaign.table([task]).to_dict("records")
+        assert row["task"] == 0 and f"found the tag '{name}'" in row["error"]
+
+
+def test_what_is_no_sweep(tmp_path: Path) -> None:
+    for folder in (tmp_path, tmp_path / "none"):
+        with pytest.raises(FileNotFoundError, match="found no files of a sweep"):
+            campaign.read(folder)
+    with pytest.raises(TypeError, match="executor: found a int; expected a function that makes an executor"):
+        campaign.table([], executor=3)  # type: ignore[arg-type]
+    for tasks in (3, {"angles": [(0, 0, 0)]}):
+        with pytest.raises(TypeError, match="expected a list or another iterable of mappings"):
+            campaign.table(tasks)  # type: ignore[arg-type]

@@ -43,14 +43,14 @@ class _Run:
         during: Values during the run.
         rests: True if nothing changes after the steady state: measurements are those of infinite time.
         measured: Lists of parameters of every observable.
-        end: Time of the last measurement.
+        last: Time of the last measurement.
     """
 
     before: Overrides | None
     during: Overrides
     rests: bool = False
     measured: dict[str, list[tuple[Expr, ...]]] = field(default_factory=dict)
-    end: Expr = sympy.S.Zero
+    last: float = 0.0
 
 
 def load(path: str | Path, *, numbers: str = "exact", starts: str = "given", until_events: bool = False) -> System:
@@ -163,6 +163,7 @@ class _Problem:
             k.values.pop(n, None)
             k.assigned.pop(n, None)
         self.observables, self.noise = self._observables()
+        self.conditions: dict[str, Overrides] = {}
         self.runs = self._runs()
         self.steady: dict[Any, dict[str, Expr]] = {}
         self.switching: set[str] = set()
@@ -187,18 +188,23 @@ class _Problem:
         return found if "time" in known else found.xreplace({symbol("time"): TIME})
 
     def _condition(self, name: str) -> Overrides:
+        if name not in self.conditions:
+            self.conditions[name] = self._overrides(name)
+        return self.conditions[name]
+
+    def _overrides(self, name: str) -> Overrides:
         table = self.problem.condition_df
         if name not in table.index:
             raise ImportProblem(f"the condition `{name}`", "one of the condition table", place="the measurements")
         out: Overrides = {}
-        for column in table.columns:
+        known = {*self.k.rates, *self.k.values, *self.k.assigned}
+        for column, cell in table.loc[name].items():
             if column == "conditionName":
                 continue
-            value = _cell(table.loc[name, column])
+            value = _cell(cell)
             if value is None:
                 continue
             target = str(column)
-            known = [*self.k.rates, *self.k.values, *self.k.assigned]
             if target in known:
                 out[target] = value
             else:
@@ -208,18 +214,16 @@ class _Problem:
 
     def _runs(self) -> list[_Run]:
         runs: list[_Run] = []
-        for _, row in self.problem.measurement_df.iterrows():
+        # by the names of their conditions, some of which may be the same
+        named: dict[tuple[str | None, str, bool], _Run] = {}
+        table = self.problem.measurement_df
+        for row in table.to_dict("records"):
             before = _cell(row.get("preequilibrationConditionId"))
-            during = self._condition(str(row["simulationConditionId"]))
-            first = None if before is None else self._condition(str(before))
-            time = float(row["time"])
-            rests = math.isinf(time)
-            if rests and first is not None:
-                raise ImportProblem("a steady state behind a steady state", "one of them", place="the measurements")
-            first = during if rests else first
-            run = next((r for r in runs if (r.before, r.during, r.rests) == (first, during, rests)), None)
-            if run is None:
-                runs.append(run := _Run(first, during, rests))
+            rests = math.isinf(float(row["time"]))
+            names = (None if before is None else str(before), str(row["simulationConditionId"]), rests)
+            if names not in named:
+                named[names] = self._run(names, runs)
+            run = named[names]
             given = row.get("observableParameters")
             text = "" if given is None or (isinstance(given, float) and math.isnan(given)) else str(given)
             parameters = tuple(_cell(part) for part in text.split(";") if part)
@@ -228,8 +232,21 @@ class _Problem:
                 measured.append(parameters)
             self.noise |= {p for p in str(row.get("noiseParameters", "")).split(";") if p.isidentifier()}
             if not rests:
-                run.end = max(run.end, exact(time))
+                run.last = max(run.last, float(row["time"]))
         return runs
+
+    def _run(self, names: tuple[str | None, str, bool], runs: list[_Run]) -> _Run:
+        """Run of conditions, one of `runs` if it has the same."""
+        before, name, rests = names
+        during = self._condition(name)
+        first = None if before is None else self._condition(before)
+        if rests and first is not None:
+            raise ImportProblem("a steady state behind a steady state", "one of them", place="the measurements")
+        first = during if rests else first
+        run = next((r for r in runs if (r.before, r.during, r.rests) == (first, during, rests)), None)
+        if run is None:
+            runs.append(run := _Run(first, during, rests))
+        return run
 
     def system(self, starts: str, until_events: bool) -> System:
         out, k, runs = self.out, self.k, self.runs
@@ -249,7 +266,7 @@ class _Problem:
                     mine.pop(n, None)
         free = {n: e for n, e in assigned.items() if n not in constants}
         nominal = {n: exact(float(self.problem.parameter_df.loc[n, "nominalValue"])) for n in self.estimated}
-        steps = Timeline(out, {**k.rules, **free}, numbers, [r.end for r in runs], k.events, nominal=nominal, until_events=until_events)
+        steps = Timeline(out, {**k.rules, **free}, numbers, [exact(r.last) for r in runs], k.events, nominal=nominal, until_events=until_events)
         out.constants = {n: v for n, v in {**k.values, **self.fixed}.items() if n not in constants}
         for n in constants:
             default = k.values.get(n, assigned.get(n))

@@ -75,6 +75,10 @@ def system(
     out.known_inputs = {_label(u): "generic" for u in known_inputs}
     out.unknown_inputs = {_label(w): "arbitrary" for w in unknown_inputs}
     out.constants = {_label(c): None if v is None else plain(v) for c, v in (constants or {}).items()}
+    for value in (*pairs.values(), *outputs.values()):
+        for found in _expression(value).atoms(sympy.core.function.AppliedUndef):
+            if found.func.__name__ not in (*out.states, *out.known_inputs, *out.unknown_inputs, *out.constants):
+                raise ImportProblem(f"`{found}`, a function without a meaning", "a state, or one of known_inputs or unknown_inputs")
     out.outputs = {str(n): plain(y) for n, y in outputs.items()}
     given = set(out.names())
     formulas = [*(s.rate for s in out.states.values()), *out.outputs.values()]
