@@ -12,7 +12,7 @@ use obsdeg_exact::SplitMix64;
 use crate::program::{obsdeg, run, stdout};
 
 /// Number of random command lines per command.
-const DRAWN: usize = 8;
+const DRAWN: usize = 16;
 
 const SCHEME: &str = "name = 's'\ncarry = 'platform'\ncombinations = ['D_IX - D_IY']\n[simulation]\nstep_s = 50\n\
                       [requirements]\nD_F = 0.1\n\

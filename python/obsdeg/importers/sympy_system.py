@@ -55,11 +55,14 @@ def system(
     if len(time) > 1:
         raise ImportProblem("functions of " + ", ".join(sorted(map(str, time))), "functions of one time")
 
+    applied: dict[str, Expr] = {}
+
     def plain(value: Any) -> Expr:
         expression = _expression(value)
         # SymPy visits common parts at every occurrence
         hold(measured(expression), "a formula")
         functions = {f: symbol(f.func.__name__) for f in expression.atoms(sympy.core.function.AppliedUndef)}
+        applied.update((name.name, f) for f, name in functions.items())
         if expression.has(sympy.Derivative):
             raise ImportProblem(f"`{expression}`", "an equation without derivatives on the right")
         found = expression.xreplace(functions)
@@ -75,11 +78,10 @@ def system(
     out.known_inputs = {_label(u): "generic" for u in known_inputs}
     out.unknown_inputs = {_label(w): "arbitrary" for w in unknown_inputs}
     out.constants = {_label(c): None if v is None else plain(v) for c, v in (constants or {}).items()}
-    for value in (*pairs.values(), *outputs.values()):
-        for found in _expression(value).atoms(sympy.core.function.AppliedUndef):
-            if found.func.__name__ not in (*out.states, *out.known_inputs, *out.unknown_inputs, *out.constants):
-                raise ImportProblem(f"`{found}`, a function without a meaning", "a state, or one of known_inputs or unknown_inputs")
     out.outputs = {str(n): plain(y) for n, y in outputs.items()}
+    for name in sorted(applied):
+        if name not in (*out.states, *out.known_inputs, *out.unknown_inputs, *out.constants):
+            raise ImportProblem(f"`{applied[name]}`, a function without a meaning", "a state, or one of known_inputs or unknown_inputs")
     given = set(out.names())
     formulas = [*(s.rate for s in out.states.values()), *out.outputs.values()]
     formulas += [s.start for s in out.states.values() if s.start is not None and not isinstance(s.start, str)]
