@@ -338,6 +338,7 @@ fn coefficients_that_are_not_known_are_refused() {
 /// Every reported combination is readable: no coefficient is a decimal, at any angles.
 #[test]
 fn combinations_can_be_read() {
+    let angles = Regex::new(r"\(-?[\d.]+ deg\)").expect("an expression");
     for kind in [Angles::Decimals, Angles::Constants, Angles::Roots] {
         for draw in cases(kind, 3, 12, &[]) {
             let a = analyze(
@@ -346,7 +347,6 @@ fn combinations_can_be_read() {
                 None,
             )
             .expect("analysed");
-            let angles = Regex::new(r"\(-?[\d.]+ deg\)").expect("an expression");
             for c in &a.combinations {
                 let coefficients = angles.replace_all(&c.expression, "");
                 assert!(
