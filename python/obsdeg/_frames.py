@@ -29,6 +29,9 @@ def record(given: Any, place: int) -> Given:
         return name, text.encode() if isinstance(text, str) else bytes(text)
     if isinstance(given, Mapping) and given:
         return name, _csv(given, name)
+    if not hasattr(given, "columns") and hasattr(given, "index") and hasattr(given, "to_frame"):
+        # a series of pandas
+        given = given.to_frame()
     if hasattr(given, "to_csv") and hasattr(given, "columns"):
         return name, _csv(_of_pandas(given), name)
     if hasattr(given, "__arrow_c_stream__"):
@@ -66,7 +69,7 @@ def arrays(
     if t is None:
         t = next((index for index in map(_time_index, sources) if index is not None), None)
         if t is None:
-            raise TypeError("found no times; expected t=..., or f or outputs of pandas with their times as index")
+            raise TypeError("found no times; expected t=..., or f or outputs of pandas with an index of dates, or named t or time")
     times = _values(t)
     columns["t" if _are_dates(times) else time] = times
     if position is not None:

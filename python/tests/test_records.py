@@ -120,6 +120,16 @@ def test_missing_samples_are_reported(frame: Any) -> None:
     assert read(record(holes, 1)).equals(holes) and b"nan" not in (record(holes, 1)[1] or b"").lower()
 
 
+def test_a_series() -> None:
+    t = numpy.arange(0, 10, 0.1)
+    decay = obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"})
+    series = pandas.Series(3 * numpy.exp(-0.7 * t), index=pandas.Index(t, name="t"), name="y")
+    for fit in (obsdeg.calibrate(decay, series), obsdeg.calibrate(decay, outputs={"y": series})):
+        assert fit["k"].estimate == pytest.approx(0.7)
+    with pytest.raises(TypeError, match="an index of dates, or named t or time"):
+        obsdeg.calibrate(decay, outputs={"y": series.rename_axis(None)})
+
+
 def test_models() -> None:
     data = pandas.read_csv(DATA, comment="#")
     own = obsdeg.calibrate(MODEL, DATA)
