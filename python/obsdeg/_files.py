@@ -56,7 +56,7 @@ def read_text(path: str | os.PathLike[str], *, errors: str = "strict") -> str:
 
 def file_name(name: str | None, kind: str) -> str:
     """Name of the text of a scheme or model, by which answers call it: that of its key `name`, if it has one."""
-    return f"{' '.join(str(name).replace('/', '-').split()) if name else kind}.toml"
+    return f"{' '.join(str(name or '').replace('/', '-').split()) or kind}.toml"
 
 
 class Text:

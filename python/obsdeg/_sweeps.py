@@ -241,7 +241,7 @@ def _asked(number: int, task: Mapping[str, Any]) -> dict[str, Any]:
     given = task.get("tags")
     given = given if isinstance(given, Mapping) else {}
     tags = {name: value.item() if hasattr(value, "item") else value for name, value in given.items() if name not in COLUMNS}
-    return {**tags, **options, "task": number} if "task" in options else {"task": number, **tags, **options}
+    return {"task": number, **tags, **options}
 
 
 def _value(name: str, value: Any) -> Any:
