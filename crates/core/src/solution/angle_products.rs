@@ -43,8 +43,10 @@ pub(super) fn products(angles: &[String]) -> Vec<Powers> {
             out = out.iter().flat_map(powers).collect();
         }
     }
+    // of (1-c)/s and s/(1+c), which are equal, the second, as the symbolic engine prints it
+    let differences = |product: &Powers| product.iter().filter(|f| f.0.starts_with("(1-")).count();
     out.sort_by_key(|(complexity, product)| {
-        (*complexity, product.iter().filter(|f| f.1 < 0).count(), product.len())
+        (*complexity, product.iter().filter(|f| f.1 < 0).count(), product.len(), differences(product))
     });
     out.into_iter().map(|(_, product)| product).take(MOST).collect()
 }
@@ -57,7 +59,7 @@ pub(super) fn power(base: &str, exponent: i32) -> String {
     }
 }
 
-/// A product as one text: `-2*c_0/(s_0*c_1)`; `root` is positive.
+/// A product as one text, factors that are sums last: `-2*c_0*(1+c_1)/(s_0*c_1)`; `root` is positive.
 pub(super) fn text(negative: bool, root: &str, above: &[String], below: &[String]) -> String {
     let sum = root.contains(['+', '-']);
     let root = match (root, above.is_empty()) {
@@ -65,13 +67,17 @@ pub(super) fn text(negative: bool, root: &str, above: &[String], below: &[String
         _ if sum => Some(format!("({root})")),
         _ => Some(root.to_string()),
     };
-    let above: Vec<&str> = root.iter().map(String::as_str).chain(above.iter().map(String::as_str)).collect();
+    let factors = |all: &mut dyn Iterator<Item = &String>| {
+        let mut all: Vec<&str> = all.map(String::as_str).collect();
+        all.sort_by_key(|factor| factor.starts_with('('));
+        all.join("*")
+    };
     let sign = if negative { "-" } else { "" };
-    let above = above.join("*");
+    let above = factors(&mut root.iter().chain(above));
     match below {
         [] => format!("{sign}{above}"),
         [one] => format!("{sign}{above}/{one}"),
-        all => format!("{sign}{above}/({})", all.join("*")),
+        all => format!("{sign}{above}/({})", factors(&mut all.iter())),
     }
 }
 
@@ -86,7 +92,8 @@ mod tests {
             (true, "1", &["c_0"][..], &["s_0"][..], "-c_0/s_0"),
             (false, "1", &[], &["s_0"], "1/s_0"),
             (false, "1/2", &["c_0^2"], &["s_0", "c_1"], "1/2*c_0^2/(s_0*c_1)"),
-            (true, "r_2/2+1", &["c_0"], &[], "-(r_2/2+1)*c_0"),
+            (true, "r_2/2+1", &["c_0"], &[], "-c_0*(r_2/2+1)"),
+            (false, "2", &["(1+c_0)^2", "s_1"], &["(1-c_1)", "c_0"], "2*s_1*(1+c_0)^2/(c_0*(1-c_1))"),
             (false, "1", &[], &[], "1"),
         ] {
             assert_eq!(text(negative, root, &names(above), &names(below)), expected);
@@ -103,6 +110,11 @@ mod tests {
         all.dedup();
         assert_eq!(all.len(), one.len());
         assert!(one.contains(&vec![("c_0".into(), 1), ("s_0".into(), -1)]));
+        let place = |factors: &[(&str, i32)]| {
+            let product: Powers = factors.iter().map(|(base, e)| (base.to_string(), *e)).collect();
+            one.iter().position(|p| *p == product).expect("a product")
+        };
+        assert!(place(&[("s_0", 1), ("(1+c_0)", -1)]) < place(&[("s_0", -1), ("(1-c_0)", 1)]));
         assert!(products(&["0".into(), "1".into(), "a".into(), "b".into()]).len() <= MOST);
     }
 }
