@@ -53,7 +53,7 @@ impl Field {
     #[inline]
     fn redc(&self, t: u128) -> u64 {
         let m = (t as u64).wrapping_mul(self.neg_inv);
-        let r = ((t + u128::from(m) * u128::from(self.p)) >> 64) as u64;
+        let r = ((t + wide_product(m, self.p)) >> 64) as u64;
         self.once(r)
     }
 
@@ -65,7 +65,7 @@ impl Field {
 
     /// The image of an unsigned integer.
     pub fn from_u64(&self, a: u64) -> u64 {
-        self.redc(u128::from(a % self.p) * u128::from(self.r2))
+        self.redc(wide_product(a % self.p, self.r2))
     }
 
     /// The image of a signed integer.
@@ -106,16 +106,16 @@ impl Field {
     /// `a b`.
     #[inline]
     pub fn mul(&self, a: u64, b: u64) -> u64 {
-        self.redc(u128::from(a) * u128::from(b))
+        self.redc(wide_product(a, b))
     }
 
     /// An element equal to `a b`, below `2p` but not always below p, for `a < 4p` and `b < 2p`: `t < 8
     /// p^2 <= p 2^64`.
     #[inline]
     pub(crate) fn loose_product(&self, a: u64, b: u64) -> u64 {
-        let t = u128::from(a) * u128::from(b);
+        let t = wide_product(a, b);
         let m = (t as u64).wrapping_mul(self.neg_inv);
-        ((t + u128::from(m) * u128::from(self.p)) >> 64) as u64
+        ((t + wide_product(m, self.p)) >> 64) as u64
     }
 
     /// Reduces a number below `4p` to one below `2p`.
@@ -160,7 +160,7 @@ impl Field {
     /// The product as an unreduced sum: see [`Field::settle`] and [`Field::reduce`].
     #[inline]
     pub fn lazy(&self, a: u64, b: u64) -> u128 {
-        u128::from(a) * u128::from(b)
+        wide_product(a, b)
     }
 
     /// Brings a settled sum plus at most [`Field::LAZY`] products below `p 2^64`: a settled sum.
@@ -215,6 +215,28 @@ impl Field {
     }
 }
 
+/// `a b` in 128 bits.
+#[cfg(not(target_arch = "wasm32"))]
+#[inline(always)]
+fn wide_product(a: u64, b: u64) -> u128 {
+    u128::from(a) * u128::from(b)
+}
+
+/// `a b` in 128 bits by products of 32 bits: a processor without 128 bits calls a function for them.
+#[cfg(any(test, target_arch = "wasm32"))]
+#[inline(always)]
+fn product_of_halves(a: u64, b: u64) -> u128 {
+    let low = |x: u64| x & 0xffff_ffff;
+    let ll = low(a) * low(b);
+    let lh = low(a) * (b >> 32) + (ll >> 32);
+    let hl = (a >> 32) * low(b) + low(lh);
+    let high = (a >> 32) * (b >> 32) + (lh >> 32) + (hl >> 32);
+    u128::from(high) << 64 | u128::from(hl << 32 | low(ll))
+}
+
+#[cfg(target_arch = "wasm32")]
+use product_of_halves as wide_product;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -232,6 +254,13 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn products_by_halves(a in any::<u64>(), b in any::<u64>()) {
+            for (a, b) in [(a, b), (u64::MAX, b), (u64::MAX, u64::MAX), (a << 32 | 0xffff_ffff, b | 0xffff_ffff)] {
+                prop_assert_eq!(product_of_halves(a, b), u128::from(a) * u128::from(b));
+            }
+        }
+
         #[test]
         fn agrees_with_big_integers(a in any::<u64>(), b in any::<u64>()) {
             let f = Field::new(P);

@@ -14,9 +14,36 @@ use std::time::{Duration, Instant};
 /// Source of the decision to continue, for the work of one thread.
 enum Cancellation {
     /// Callback of this thread, called when the interval has passed.
-    Callback { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant },
+    Callback { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant, clock: Clock },
     /// Flag that another thread sets.
     Flag(Arc<AtomicBool>),
+}
+
+/// Clock that is read at every check, or at one of [`SKIPPED`] where checks follow each other closely: their
+/// number may be thousands in a millisecond.
+struct Clock {
+    read: Instant,
+    /// Time of [`SKIPPED`] checks that follow each other closely.
+    close: Duration,
+    /// Number of checks until the next reading.
+    left: u32,
+}
+
+/// Largest number of checks without a reading of the clock.
+const SKIPPED: u32 = 15;
+
+impl Clock {
+    /// Time now, if it is read at this check.
+    fn now(&mut self) -> Option<Instant> {
+        if self.left > 0 {
+            self.left -= 1;
+            return None;
+        }
+        let now = Instant::now();
+        self.left = if now - self.read < self.close { SKIPPED } else { 0 };
+        self.read = now;
+        Some(now)
+    }
 }
 
 /// Payload of the unwinding.
@@ -33,7 +60,9 @@ pub fn hearing<T>(
     goes_on: impl FnMut() -> bool + 'static,
     work: impl FnOnce() -> T,
 ) -> Option<T> {
-    run(Cancellation::Callback { goes_on: Box::new(goes_on), interval, last: Instant::now() }, work)
+    let last = Instant::now();
+    let clock = Clock { read: last, close: interval / 100, left: 0 };
+    run(Cancellation::Callback { goes_on: Box::new(goes_on), interval, last, clock }, work)
 }
 
 /// Runs `work` until `wanted` is false, then returns `None`. [`crate::parallel`] carries this to other
@@ -59,12 +88,14 @@ pub fn check() {
     let Some(mut hearing) = CANCELLATION.take() else { return };
     let goes_on = match &mut hearing {
         Cancellation::Flag(wanted) => wanted.load(Ordering::Relaxed),
-        Cancellation::Callback { last, interval, .. } if last.elapsed() < *interval => true,
-        Cancellation::Callback { goes_on, last, .. } => {
-            let goes_on = goes_on();
-            *last = Instant::now();
-            goes_on
-        }
+        Cancellation::Callback { goes_on, interval, last, clock } => match clock.now() {
+            Some(now) if now - *last >= *interval => {
+                let goes_on = goes_on();
+                *last = Instant::now();
+                goes_on
+            }
+            _ => true,
+        },
     };
     CANCELLATION.set(Some(hearing));
     if !goes_on {
@@ -128,6 +159,16 @@ mod tests {
     fn what_is_asked_may_work_itself() {
         let inner = move || hearing(Duration::ZERO, || false, || count(9, &Rc::default())).is_none();
         assert_eq!(hearing(Duration::ZERO, inner, || count(50, &Rc::default())), Some(49));
+    }
+
+    /// Where checks follow each other closely, one of sixteen reads the clock; where they do not, each does.
+    #[test]
+    fn the_clock_is_read_as_often_as_needed() {
+        let mut clock = Clock { read: Instant::now(), close: Duration::from_secs(60), left: 0 };
+        let readings = |clock: &mut Clock| (0..160).filter(|_| clock.now().is_some()).count();
+        assert_eq!(readings(&mut clock), 10);
+        clock.close = Duration::ZERO;
+        assert_eq!(readings(&mut clock), 160);
     }
 
     #[test]
