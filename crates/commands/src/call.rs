@@ -1,6 +1,7 @@
 //! Calls from other languages: a command by its name, options and files as JSON.
 
 use obsdeg_calibration::record::Record;
+use obsdeg_core::language::explain_message;
 use obsdeg_report::{
     Answer, Explanation, File, Format, ReviewFormat, TerminalLayout, csv, fragment, next_figures,
     picture_folder, position_figure, sensor_figures, written,
@@ -466,9 +467,11 @@ fn typed<T: DeserializeOwned>(map: Map<String, Value>) -> Result<T, Problem> {
     serde_json::from_value(Value::Object(map)).map_err(|e| {
         let wrong = alone.into_iter().find_map(|(name, value)| {
             let one = Map::from_iter([(name.clone(), value)]);
-            serde_json::from_value::<T>(Value::Object(one)).err().map(|e| format!("{name}: {e}"))
+            serde_json::from_value::<T>(Value::Object(one))
+                .err()
+                .map(|e| format!("{name}: {}", explain_message(&e.to_string())))
         });
-        Problem::input(wrong.unwrap_or_else(|| e.to_string()))
+        Problem::input(wrong.unwrap_or_else(|| explain_message(&e.to_string())))
     })
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn explain<T: JsonSchema>(text: &str, e: &toml::de::Error) -> (String
                 span,
             )
         }
-        _ => (misplaced::<T>(message).unwrap_or_else(|| words(message)), span),
+        _ => (misplaced::<T>(message).unwrap_or_else(|| explain_message(message)), span),
     }
 }
 
@@ -115,7 +115,7 @@ fn without_commas(text: &str, span: Range<usize>) -> Option<(String, Range<usize
 }
 
 /// Message of a reader about keys and kinds, in words.
-pub(crate) fn words(message: &str) -> String {
+pub fn explain_message(message: &str) -> String {
     unknown_key(message)
         .or_else(|| unknown_value(message))
         .or_else(|| missing(message))

@@ -10,6 +10,7 @@ pub use expression::{
     evaluate_f64, from_i128,
 };
 pub(crate) use expression::{among, nearest};
+pub use file_error::explain_message;
 pub use parser::{Components, Shapes, parse, parse_components, parse_equation, parse_with};
 pub(crate) use vectors::component;
 pub use vectors::{MAX_ENTRIES, Shape};

@@ -12,7 +12,7 @@ use super::model::{
     Constant, FilePlace, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelSegment, Named, PlacedExpression,
     State, StateStart, SystemModel, check_signs,
 };
-use crate::language::file_error::{json_kind, words};
+use crate::language::file_error::{explain_message, json_kind};
 use crate::language::{Names, parse_with};
 use crate::model::angle::excerpt;
 
@@ -189,7 +189,11 @@ impl JsonFile<'_> {
         } else {
             start
         };
-        ModelError { what: "the model file".into(), message: words(message), span: Some(start..before.len()) }
+        ModelError {
+            what: "the model file".into(),
+            message: explain_message(message),
+            span: Some(start..before.len()),
+        }
     }
 }
 
