@@ -9,7 +9,7 @@ use obsdeg_evidence::crosscheck::{
 use crate::Answer;
 use crate::document::{Document, DocumentBlock, left, number, optional, right};
 use crate::simulation::{conditions, validity, warning};
-use crate::words::{self, at_most, band};
+use crate::words::{self, band, wrong_below};
 
 /// Mark of the outcome of a check.
 fn mark(outcome: Agreement) -> String {
@@ -287,7 +287,7 @@ impl Answer for CrossCheck {
         assumed.push(format!("carry {}; seed {}; {drawn}", self.carry, self.seed));
         let wrong = self.filter.as_ref();
         assumed.extend(wrong.map(|filter| format!("the filter is wrong on purpose: {filter}")));
-        assumed.push(format!("a prediction is wrong with probability below {}", at_most(self.error_bound)));
+        assumed.push(format!("a prediction is {}", wrong_below(self.error_bound)));
         blocks.push(DocumentBlock::list("Assumed", assumed));
         let verdict = match (self.passed, self.verdicts_agree) {
             (true, _) if self.counts.not_resolvable > 0 => {

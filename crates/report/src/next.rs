@@ -175,11 +175,7 @@ fn validity(n: &NextPositions) -> Vec<String> {
             "the added positions are a separate run after the calibration, with a psi of its own".into(),
         );
     }
-    out.push(format!(
-        "a verdict on an extension is wrong with probability below {}; seed {}",
-        words::at_most(n.error_bound),
-        n.seed
-    ));
+    out.push(format!("a verdict on an extension is {}; seed {}", words::wrong_below(n.error_bound), n.seed));
     if !n.not_judged.is_empty() {
         out.push(format!("not judged: requirements on {}", names(n.not_judged.iter().map(String::as_str))));
     }

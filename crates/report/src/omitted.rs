@@ -641,8 +641,8 @@ pub(crate) fn classes(of: &OmittedVerdicts) -> Vec<String> {
     });
     out.extend(first_lines(silent.collect()));
     out.push(format!(
-        "classes: exact ranks modulo two random primes, wrong with probability below {}; {}",
-        words::at_most(of.error_bound),
+        "classes: exact ranks modulo two random primes, {}; {}",
+        words::wrong_below(of.error_bound),
         match of.torquers_in_turns {
             true => "GS and GM act in the stated turns too",
             false => "GS and GM act at the earth rate alone",

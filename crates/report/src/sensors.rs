@@ -233,10 +233,10 @@ fn certainty(s: &Sensors) -> String {
     match (s.error_bound, s.digits) {
         (Some(bound), _) => format!(
             "degrees under {} by ranks at a random point, those of the {} that this answer rests on at a \
-             second one too; one of these is wrong with probability below {}",
+             second one too; one of these is {}",
             count(s.judged_sets, "set"),
             s.relied_on_sets,
-            words::at_most(bound)
+            words::wrong_below(bound)
         ),
         _ => format!(
             "degrees under {} by ranks of real numbers at a random point, those of the {} that this answer \

@@ -33,7 +33,7 @@ fn explanation(q: &SystemQuantity, constrained: bool) -> String {
 pub(crate) fn certainty(error_bound: Option<f64>, digits: Option<DigitsReport>, seed: u64) -> String {
     match (error_bound, digits) {
         (Some(bound), _) => {
-            format!("a verdict is wrong with probability below {}; seed {seed}", words::at_most(bound))
+            format!("a verdict is {}; seed {seed}", words::wrong_below(bound))
         }
         (None, Some(d)) => {
             let zero = d.zero_log10.map_or_else(
@@ -265,8 +265,8 @@ fn assumed(a: &SystemAnalysis) -> Vec<String> {
     }
     assumed.push(match (&a.primes, a.error_bound) {
         (Some([p, q]), Some(bound)) => format!(
-            "ranks modulo the random primes {p} and {q} at random points; wrong with probability below {}; seed {}",
-            words::at_most(bound),
+            "ranks modulo the random primes {p} and {q} at random points; {}; seed {}",
+            words::wrong_below(bound),
             a.seed
         ),
         _ => certainty(a.error_bound, a.digits, a.seed),

@@ -4,7 +4,7 @@ use obsdeg_design::design::Walks;
 
 use crate::Answer;
 use crate::document::{Document, DocumentBlock, left, right};
-use crate::words::{at_most, reasons};
+use crate::words::{reasons, wrong_below};
 
 /// Sentences on the examined slew sequences and their consequence.
 fn examined(w: &Walks) -> Vec<String> {
@@ -22,8 +22,8 @@ fn examined(w: &Walks) -> Vec<String> {
     out.push(match (w.positions, w.proven) {
         (Some(k), true) if w.none_of.is_empty() => format!("so {k} positions are the fewest, by counting"),
         (Some(k), true) => format!(
-            "so {k} positions are the fewest of these candidates and turns (wrong with probability below {})",
-            at_most(w.error_bound)
+            "so {k} positions are the fewest of these candidates and turns ({})",
+            wrong_below(w.error_bound)
         ),
         (Some(k), false) if w.interrupted => format!("interrupted: whether fewer than {k} do is not known"),
         (Some(k), false) => {

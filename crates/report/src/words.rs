@@ -413,16 +413,26 @@ pub(crate) fn at_most(bound: f64) -> String {
     }
 }
 
+/// A bound on the probability of an error, after "a verdict is": `wrong with probability below 8e-23`. Numbers
+/// with very many digits leave none below one.
+pub(crate) fn wrong_below(bound: f64) -> String {
+    if bound < 1.0 {
+        format!("wrong with probability below {}", at_most(bound))
+    } else {
+        "without a bound on the probability of an error (numbers with fewer digits have one)".into()
+    }
+}
+
 /// Sentence on the certainty of verdicts and solutions.
 pub(crate) fn certainty(a: &Analysis) -> String {
     let c = &a.certainty;
     let mut out = format!(
-        "{} (p = {}, {}; seed {}): a verdict is wrong with probability below {}",
+        "{} (p = {}, {}; seed {}): a verdict is {}",
         c.method,
         c.primes[0],
         c.primes[1],
         c.seed,
-        at_most(c.error_bound)
+        wrong_below(c.error_bound)
     );
     let solutions: Vec<&Solution> = a
         .quantities

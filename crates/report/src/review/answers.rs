@@ -197,10 +197,10 @@ pub(super) fn proven(a: &Analysis, certified: bool) -> String {
     let c = &a.certainty;
     let certificate = if certified { "; certificate: see How to check this without obsdeg" } else { "" };
     format!(
-        "Status and degree: {}, a verdict is wrong with probability below {}{certificate}. Sigmas are \
+        "Status and degree: {}, a verdict is {}{certificate}. Sigmas are \
          predicted, not proven",
         c.method,
-        words::at_most(c.error_bound)
+        words::wrong_below(c.error_bound)
     )
 }
 
