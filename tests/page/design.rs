@@ -5,8 +5,8 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
+use crate::opened::{choose, click, opened, quiet, scheme, wait, write, wrong};
 use crate::program::{json as answer_of, run};
-use crate::workbench_page::{choose, click, opened, quiet, scheme, wait, write, wrong};
 
 /// Condition that a search has ended and its schemes are listed.
 const FOUND: &str = "document.querySelector('#found tbody tr') && document.getElementById('design-stop').disabled && \

@@ -4,8 +4,8 @@
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
+use crate::opened::{choose, click, key, opened, place, quiet, says, scheme, wait, write, wrong};
 use crate::program::json as answer_of;
-use crate::workbench_page::{choose, click, key, opened, place, quiet, says, scheme, wait, write, wrong};
 
 /// A text that the page refuses, or a value that the engine refuses, is named at its field; the last good
 /// answer stays, faded where the scheme itself is wrong.

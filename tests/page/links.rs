@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
-use crate::workbench_page::{opened, quiet, scheme, wait};
+use crate::opened::{opened, quiet, scheme, wait};
 
 /// Scheme file with two positions, `before` in front of them and `within` in the first.
 fn file(before: &str, within: &str) -> String {

@@ -6,11 +6,11 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
-use crate::program::run;
-use crate::workbench_page::{
+use crate::opened::{
     choose, click, drag, key, names, opened, place, quiet, root, says, scheme, swipe, thumb, wait, write,
     wrong,
 };
+use crate::program::run;
 
 #[test]
 fn positions_are_edited() {

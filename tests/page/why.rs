@@ -5,8 +5,8 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
+use crate::opened::{choose, click, opened, quiet, scheme, wait, write};
 use crate::program::{json as answer_of, run, stdout};
-use crate::workbench_page::{choose, click, opened, quiet, scheme, wait, write};
 
 /// Texts of the elements that a selector finds.
 fn texts(b: &mut Browser, selector: &str) -> Vec<String> {

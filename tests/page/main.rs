@@ -1,0 +1,15 @@
+//! Tests of the workbench in a real browser: `cargo test --test page`, after `cargo run -p obsdeg-web` has built
+//! the page, which takes minutes. `cargo test` leaves them out.
+
+#[path = "../it/browser.rs"]
+mod browser;
+mod design;
+mod fields;
+mod links;
+mod opened;
+mod positions;
+#[path = "../it/program.rs"]
+#[allow(dead_code, reason = "other tests need more of it")]
+mod program;
+mod verdicts;
+mod why;
