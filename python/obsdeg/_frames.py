@@ -9,6 +9,8 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from ._files import check_package
+
 #: Record in the form of the engine: name, and content if it is not a file.
 Given = tuple[str, "bytes | None"]
 _EXPECTED = "a file (CSV, Parquet), a text stream, a frame of pandas, polars or pyarrow, or columns by name"
@@ -138,11 +140,9 @@ def _of_pandas(frame: Any, with_time: bool = True) -> dict[str, Any]:
 
 def _of_arrow(frame: Any) -> dict[str, Any]:
     """Columns of a frame with the C interface of Arrow."""
-    try:
-        import pyarrow
-    except ModuleNotFoundError:
-        kind = type(frame).__name__
-        raise ImportError(f"a {kind} is read with the package `pyarrow`, which is not installed: pip install 'obsdeg[frames]'") from None
+    check_package("pyarrow", f"a record of type {type(frame).__name__}", "obsdeg[frames]")
+    import pyarrow
+
     table = pyarrow.table(frame)
     return {str(name): column for name, column in zip(table.column_names, table.columns, strict=True)}
 

@@ -12,7 +12,7 @@ from typing import Any
 import obsdeg
 
 from ._asked import digest, key, key_of, written
-from ._files import place
+from ._files import check_package, place
 from ._work import INPUT
 from .options import Analyze, Simulate
 
@@ -38,7 +38,8 @@ def judged_rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
     # only schemes have classes of omitted errors
     bare = {"solutions": False} if "model" in task else {"solutions": False, "omitted": False}
     exact = {**bare, **{k: v for k, v in options.items() if k not in _MEASURED}}
-    verdicts = obsdeg.analyze(*what, **exact).to_dict()
+    answer = obsdeg.analyze(*what, **exact)
+    verdicts, rounded = answer.to_dict(), "; ".join(map(str, answer.rounded)) or None
     numbers = {}
     if _MEASURED & options.keys():
         run = obsdeg.simulate(*what, **{k: v for k, v in options.items() if k not in _JUDGED}).to_dict()
@@ -48,7 +49,7 @@ def judged_rows(task: Mapping[str, Any]) -> list[dict[str, Any]]:
         n = numbers.get(q["name"], {})
         verdict = {"name": q["name"], "status": q["status"], "degree": q.get("degree")}
         number = {name: n.get(name) for name in ("sigma", "unit", "outcome")}
-        rows.append({"rank": verdicts["rank"], **verdict, **number, "error": None})
+        rows.append({"rank": verdicts["rank"], **verdict, **number, "rounded": rounded, "error": None})
     return rows
 
 
@@ -79,6 +80,7 @@ FOUND = {
     "sigma": "double",
     "unit": "string",
     "outcome": "string",
+    "rounded": "string",
     "error": "string",
 }
 
@@ -99,6 +101,7 @@ def said(error: BaseException) -> str:
 
 def parquet(rows: list[dict[str, Any]], columns: list[str]) -> bytes:
     """Rows as a Parquet file that begins with the given columns, even if no row has them."""
+    check_package("pyarrow", "a file of a sweep", "obsdeg[frames]")
     import pyarrow
     import pyarrow.parquet
 

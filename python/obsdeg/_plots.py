@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ._files import check_package
+
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
@@ -23,10 +26,9 @@ def figure_of(width: float, height: float) -> Figure:
     Raises:
         ImportError: matplotlib is not installed.
     """
-    try:
-        from matplotlib import pyplot
-    except ModuleNotFoundError:
-        raise ImportError("plot() draws with the package `matplotlib`, which is not installed: pip install 'obsdeg[plots]'") from None
+    check_package("matplotlib", "plot()", "obsdeg[plots]")
+    from matplotlib import pyplot
+
     return pyplot.figure(figsize=(width, height), layout="constrained")
 
 
@@ -164,6 +166,7 @@ def design(of: _results.Design, canvas: Canvas) -> list[Axes]:
         if abs(most - least) < 1e-3 * abs(least):
             panels[0].set_xlim(sorted((0.9 * least, 1.1 * least)))
         panels[0].ticklabel_format(axis="x", useOffset=False)
+        panels[0].locator_params(axis="x", nbins=5)
         panels[0].set_xlabel(value)
         panels[0].set_title("Schemes found, best first", fontsize="medium")
         panels[0].grid(alpha=0.3)
@@ -272,3 +275,50 @@ def system_evidence(of: _results.SystemEvidence, canvas: Canvas) -> list[Axes]:
     axes.legend(fontsize="small")
     axes.grid(alpha=0.3)
     return [axes]
+
+
+#: Degrees with a colour of their own in the picture of a sweep; larger ones have the last colour.
+_DEGREES = 8
+
+
+def sweep(rows: pandas.DataFrame, x: str, canvas: Canvas) -> list[Axes]:
+    """Draws the degree of every unknown along a tag or option of a sweep and, if there are sigmas, these below."""
+    from matplotlib import colormaps
+    from matplotlib.colors import BoundaryNorm
+    from matplotlib.patches import Patch
+
+    judged = rows[rows["name"].notna()]
+    degrees = judged.pivot(index="name", columns=x, values="degree").reindex(judged["name"].unique())
+    if judged[x].dtype.kind not in "iufb":
+        degrees = degrees[judged[x].unique()]
+    grid = degrees.astype("float64").to_numpy()
+    places = range(len(degrees.columns))
+    runs = "sigma" in rows
+    panels = _panels(canvas, 1 + runs, height_ratios=[1, 0.8] if runs else [1])
+    shades = colormaps["viridis_r"].resampled(_DEGREES)
+    panels[0].imshow(grid.clip(max=_DEGREES - 1), aspect="auto", interpolation="nearest", cmap=shades, norm=BoundaryNorm(range(_DEGREES + 1), _DEGREES))
+    if len(degrees) <= _NAMES:
+        panels[0].set_yticks(range(len(degrees)), list(degrees.index), fontsize="small")
+    step = -(-len(places) // 12)
+    panels[0].set_xticks(places[::step], [_short(v) for v in degrees.columns[::step]], fontsize="small")
+    found = sorted({int(d) for d in grid[grid == grid].clip(max=_DEGREES - 1)})
+    label = [f"{d} or more" if d == _DEGREES - 1 else str(d) for d in found]
+    patches = [Patch(facecolor=shades(d), label=text) for d, text in zip(found, label, strict=True)]
+    patches.append(Patch(facecolor="white", edgecolor="0.7", label="not observable"))
+    panels[0].legend(handles=patches, title="observable degree", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(patches), frameon=False, fontsize="small")
+    panels[0].set_xlabel(x)
+    if runs:
+        for i, (name, of) in enumerate(judged.dropna(subset=["sigma"]).groupby("name", sort=False)):
+            along = of.sort_values(x)
+            unit = f" [{of['unit'].iloc[0]}]" if of["unit"].iloc[0] else ""
+            panels[1].plot(along[x], along["sigma"], marker="o", markersize=3, linestyle=("-", "--", ":")[i // 10 % 3], label=f"{name}{unit}")
+        panels[1].set_yscale("log")
+        panels[1].set_xlabel(x)
+        panels[1].set_ylabel("sigma at the end of the run")
+        panels[1].legend(fontsize="x-small", ncols=2, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        panels[1].grid(alpha=0.3)
+    return panels
+
+
+def _short(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -10,6 +10,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from . import _obsdeg, _plots, shapes
+from ._files import check_package
 from ._records import Record, fields, found, rows
 from ._texts import Rounded
 
@@ -132,8 +133,10 @@ class Answer:
         return json.loads(self.json())
 
     def text(self, format: str = "table") -> str:
-        """Output of the command line: table, json, markdown, csv or latex."""
-        return self._answer().written(format)
+        """Output of the command line: table, json, markdown, csv or latex. Tables and Markdown end with the
+        computed numbers that were rounded, if there are any."""
+        written = self._answer().written(format)
+        return f"{written}\n{self._rounding()}\n" if self._rounded and format in ("table", "markdown") else written
 
     def csv(self, table: str | None = None) -> str:
         """List of the JSON as CSV, by default the main one."""
@@ -146,6 +149,7 @@ class Answer:
         Raises:
             ProblemError: no such list; the message lists the available names.
         """
+        check_package("pandas", "to_frame()", "obsdeg[frames]")
         import pandas
 
         if self._rust is None and self._asked is None:
@@ -193,8 +197,7 @@ class Answer:
     def __str__(self) -> str:
         if self._is_read():
             return repr(self)
-        table = self.text("table")
-        return f"{table}\n{self._rounding()}\n" if self._rounded else table
+        return self.text("table")
 
     def __repr__(self) -> str:
         rounded = f"; {self._rounding()}" if self._rounded else ""
@@ -295,6 +298,7 @@ class Run(Drawn):
     def series(self) -> pandas.DataFrame:
         """Truth, estimate and sigma over time, one column each, with units."""
         if "_series" not in self.__dict__:
+            check_package("pandas", "series()", "obsdeg[frames]")
             import pandas
 
             self._series = pandas.read_csv(io.BytesIO(self.files(pictures=False)["series.csv"]))
@@ -424,11 +428,29 @@ class Analysis(Named[shapes.Quantity], Judgement, shapes.Analysis):
 
 
 class SystemAnalysis(Named[shapes.SystemQuantity], Judgement, shapes.SystemAnalysis):
-    """Observable degree of every unknown of a model."""
+    """Observable degree of every unknown of a model.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> decay = obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"})
+    >>> answer = obsdeg.analyze(decay)
+    >>> answer["k"].degree, answer["k"].identifiability
+    (1, 'globally_identifiable')
+    """
 
 
 class Judgements(Answer):
-    """Answers on several schemes and models, in order: a sequence of :class:`Judgement`."""
+    """Answers on several schemes and models, in order: a sequence of :class:`Judgement`.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial", latitude=28.2)
+    >>> both = obsdeg.analyze(pair, pair.replace(carry="reset"))
+    >>> [one.rank for one in both]
+    [8, 10]
+    """
 
     def __len__(self) -> int:
         return len(self._dict())
@@ -461,7 +483,16 @@ class Judgements(Answer):
 
 class Comparison(Drawn, shapes.Comparison):
     """Schemes side by side: ``comparison["a.toml"]`` or ``comparison[0]`` is the entry of one; iteration goes
-    through all."""
+    through all.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial", latitude=28.2)
+    >>> third = pair.replace(positions=[*pair, "DNE"], name="three")
+    >>> [(one.name, one.rank) for one in obsdeg.compare(pair, third)]
+    [('scheme', (8, 15)), ('three', (11, 15))]
+    """
 
     _main = "schemes"
 
@@ -487,7 +518,17 @@ class Comparison(Drawn, shapes.Comparison):
 
 
 class Design(Drawn, shapes.Design):
-    """Found schemes, the best first: ``design[0]`` is the best; iteration goes through all."""
+    """Found schemes, the best first: ``design[0]`` is the best; iteration goes through all.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> found = obsdeg.design(4, carry="inertial", observable="D_F")
+    >>> found[0].positions
+    ['NUE', 'UNW', 'NDW', 'DNE']
+    >>> obsdeg.analyze(found.winner())["D_FX"].status
+    'observable'
+    """
 
     _main = "found"
 
@@ -548,13 +589,29 @@ class Sensors(Named[shapes.SensorUnknown], Answer, shapes.Sensors):
 
     ``found["k1"]`` is the cheapest set for an unknown. ``found.front`` lists the sets from the cheapest to
     the set with the smallest degree.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> chain = obsdeg.Model(states={"x1": "-k1*x1", "x2": "k1*x1-k2*x2"}, outputs={"y1": "x1", "y2": "x2"})
+    >>> found = obsdeg.measure(chain)
+    >>> found["k1"].cheapest.outputs, [one.outputs for one in found.front]
+    (['x1'], [['x2'], ['x1', 'x2']])
     """
 
     _main = "front"
 
 
 class NextPositions(Answer, shapes.NextPositions):
-    """Extensions of a scheme by one or two positions, best first: ``found[0]`` is the best."""
+    """Extensions of a scheme by one or two positions, best first: ``found[0]`` is the best.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial", latitude=28.2)
+    >>> [added.candidate for added in obsdeg.next_measurement(pair)[0].positions]
+    ['SWD']
+    """
 
     _main = "found"
 
@@ -574,13 +631,30 @@ class Part(Answer, shapes.Part):
 
 
 class Simulation(Named[shapes.Estimate], Run, shapes.Simulation):
-    """A run of the filter on a scheme against a simulated truth."""
+    """A run of the filter on a scheme against a simulated truth.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial", latitude=28.2)
+    >>> run = obsdeg.simulate(pair)
+    >>> run["D_FX"].unit, run["D_FX"].sigma < run["D_FX"].prior_sigma
+    ('deg/h', True)
+    """
 
 class SystemRun(Named[shapes.SystemEstimate], Run, shapes.SystemRun):
     """A run of the filter on a model against a simulated truth."""
 
 class CrossCheck(Named[shapes.QuantityEvidence], Drawn, shapes.CrossCheck):
-    """The exact verdicts on a scheme against a filter."""
+    """The exact verdicts on a scheme against a filter.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial", latitude=28.2)
+    >>> obsdeg.crosscheck(pair).passed
+    True
+    """
 
     if TYPE_CHECKING:
         # attribute of both the answer and its JSON, with equal values
@@ -604,7 +678,18 @@ class SystemEvidence(Named[shapes.SystemQuantityEvidence], Drawn, shapes.SystemE
 
 
 class Calibration(Named[shapes.Estimated], Drawn, shapes.Calibration):
-    """Estimates of the unknowns that a scheme determines, from records."""
+    """Estimates of the unknowns that a scheme determines, from records.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial", latitude=28.2)
+    >>> t = range(0, 4000, 100)
+    >>> f = [(0, 1, 0) if s < 2000 else (0, -1, 0) for s in t]
+    >>> fit = obsdeg.calibrate(pair, t=t, f=f, position=[1 if s < 2000 else 2 for s in t], noise=1e-5)
+    >>> fit["D_FX"].unit, fit["D_FX"].determined, fit["D_IZ"].determined
+    ('deg/h', True, False)
+    """
 
     def covariance_frame(self) -> pandas.DataFrame:
         """Covariance matrix of the estimates."""
@@ -618,7 +703,15 @@ class Calibration(Named[shapes.Estimated], Drawn, shapes.Calibration):
 
 
 class Procedure(Answer, shapes.Procedure):
-    """Sheet of a run: turns, waits and recordings in order of time."""
+    """Sheet of a run: turns, waits and recordings in order of time.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> pair = obsdeg.Scheme([(0, 0, 0), (180, 0, 0)], carry="inertial", latitude=28.2)
+    >>> [step.kind for step in obsdeg.procedure(pair).steps]
+    ['set', 'record', 'turn', 'record']
+    """
 
     def controller(self) -> str:
         """Table for a controller, as the command line writes it to ``controller.csv`` or ``controller.txt``."""
@@ -627,7 +720,15 @@ class Procedure(Answer, shapes.Procedure):
 
 
 class SensorNoise(Answer, shapes.SensorNoiseReport):
-    """Noise of sensors at rest, by the Allan deviation of a record."""
+    """Noise of sensors at rest, by the Allan deviation of a record.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> noise = obsdeg.allan("tests/data/static/imu.csv")
+    >>> [column.column for column in noise.columns]
+    ['wx [deg/h]', 'fx [g]']
+    """
 
 
 class SystemCalibration(Named[shapes.SystemEstimated], Drawn, shapes.SystemCalibration):
@@ -645,7 +746,15 @@ class SystemCalibration(Named[shapes.SystemEstimated], Drawn, shapes.SystemCalib
 
 
 class Audit(Answer, shapes.Audit):
-    """Equations and claims of the paper, checked against the algebra."""
+    """Equations and claims of the paper, checked against the algebra.
+
+    Examples
+    --------
+    >>> import obsdeg
+    >>> audit = obsdeg.paper()
+    >>> audit.passed, len(audit.lines) > 0
+    (True, True)
+    """
 
 
 #: Classes of answers by the schemas that they name.

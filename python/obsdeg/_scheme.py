@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal, Union, cast
 
@@ -192,6 +192,9 @@ class Scheme(Text):
 
     def __len__(self) -> int:
         return len(self._read().get("position", ()))
+
+    def __iter__(self) -> Iterator[Position]:
+        return iter(self.positions)
 
     def __bool__(self) -> bool:
         return True

@@ -11,13 +11,17 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from . import _plots
 from ._asked import checked, stand_in
 from ._judged import COLUMNS, FOUND, WHAT, judged_rows, said
-from ._work import INPUT
+from ._files import check_package
+from ._work import INPUT, Ended
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
 #: Number of tasks that a thread or worker takes at a time.
 _CHUNK = 20
@@ -59,7 +63,8 @@ def table(
     pandas.DataFrame
         Columns: ``task`` (number of the task, from 0), the tags, the options that are numbers or texts,
         ``rank``, ``name``, ``status``, ``degree``; with simulated runs ``sigma`` in ``unit`` and ``outcome``;
-        ``error`` for tasks with an error. :func:`to_xarray` converts it to a data set of xarray.
+        ``rounded`` for tasks with computed angles that were rounded; ``error`` for tasks with an error.
+        :func:`to_xarray` converts it to a data set of xarray, :func:`plot` draws it.
 
     Raises
     ------
@@ -73,7 +78,7 @@ def table(
     >>> rows[rows.status == "observable"].groupby("x").size().to_dict()
     {0: 7, 30: 12, 60: 12}
     """
-    from .campaign import run
+    from .campaign import failed, run
 
     if errors not in ("raise", "record"):
         raise ValueError(f"errors: found {errors!r}; expected 'raise' or 'record'")
@@ -81,10 +86,13 @@ def table(
         raise TypeError(f"executor: found a {type(executor).__name__}; expected a function that makes an executor, such as campaign.threads")
     if isinstance(tasks, Mapping) or not isinstance(tasks, Iterable):
         raise TypeError(f"tasks: found a {type(tasks).__name__}; expected a list or another iterable of mappings")
+    check_package("pandas", "a table of a sweep", "obsdeg[frames]")
     found: dict[int, list[dict[str, Any]]] = {}
     done = 0
     for _, chunk in run(partial(_judged, record=errors == "record"), _chunks(tasks), executor=executor):
         for number, rows in chunk:
+            if isinstance(rows, Ended):
+                raise failed(rows, str(number))
             found[number] = rows
         done += len(chunk)
         if heard is not None:
@@ -119,6 +127,8 @@ def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
     >>> rows.groupby("latitude")["rank"].first().to_dict()
     {0: 8, 45: 8}
     """
+    for package in ("pandas", "pyarrow"):
+        check_package(package, "a table of a sweep", "obsdeg[frames]")
     import pyarrow.parquet
 
     files = sorted(Path(folder).glob("*.parquet"))
@@ -126,7 +136,8 @@ def read(folder: str | os.PathLike[str]) -> pandas.DataFrame:
         raise FileNotFoundError(f"{os.fspath(folder)}: found no files of a sweep (*.parquet); expected the folder of one")
     by_task: dict[str, list[dict[str, Any]]] = {}
     for file in files:
-        names = ["task", *FOUND]
+        there = pyarrow.parquet.read_schema(file).names
+        names = [name for name in ("task", *FOUND) if name in there]
         for row in pyarrow.parquet.read_table(file, columns=names).to_pylist():
             by_task.setdefault(row.pop("task"), []).append(row)
     rows: list[dict[str, Any]] = []
@@ -173,12 +184,10 @@ def to_xarray(rows: pandas.DataFrame, dims: Sequence[str] | None = None) -> xarr
     >>> data["rank"].sel(latitude=45).to_series().to_dict()
     {0: 8.0, 30: 12.0}
     """
-    try:
-        import xarray
-    except ModuleNotFoundError:
-        message = "a data set is made with the package `xarray`, which is not installed: pip install xarray"
-        raise ImportError(message) from None
-    asked = [str(name) for name in rows.columns if name not in ("task", *FOUND)]
+    check_package("xarray", "a data set")
+    import xarray
+
+    asked = _options_of(rows)
     tasks = rows.groupby("task").first()
     if dims is None:
         dims = [name for name in asked if tasks[name].nunique() > 1]
@@ -206,6 +215,63 @@ def to_xarray(rows: pandas.DataFrame, dims: Sequence[str] | None = None) -> xarr
     return ordered
 
 
+def plot(rows: pandas.DataFrame, x: str | None = None, *, figure: Figure | SubFigure | None = None) -> list[Axes]:
+    """Draws a table of :func:`table` or :func:`read` with matplotlib: the degree of every unknown along a tag or
+    an option and, of simulated runs, the sigmas below.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Table of a sweep. One task for each value of ``x``: select some rows if there are more.
+    x : str, optional
+        Tag or option along the horizontal axis; by default the only one with more than one value.
+    figure : matplotlib Figure or SubFigure, optional
+        Figure to draw in; by default a new figure of pyplot.
+
+    Returns
+    -------
+    list of matplotlib Axes
+        The panels.
+
+    Raises
+    ------
+    ValueError
+        ``x`` is no tag or option, or two tasks have the same value of it.
+    ImportError
+        matplotlib is not installed (``pip install 'obsdeg[plots]'``).
+
+    Examples
+    --------
+    >>> from obsdeg import campaign
+    >>> pair = [(0, 0, 0), (180, 0, 0)]
+    >>> rows = campaign.table(dict(angles=[*pair, (x, 0, 0)], tags={"x": x}) for x in (0, 30, 60))
+    >>> axes = campaign.plot(rows)
+    >>> axes[0].get_xlabel()
+    'x'
+    """
+    if "task" not in rows or "name" not in rows:
+        raise ValueError(f"rows: found the columns {', '.join(map(str, rows.columns))}; expected a table of campaign.table or campaign.read")
+    varied = [name for name in _options_of(rows) if rows[name].nunique() > 1]
+    if x is None and len(varied) != 1:
+        found = ", ".join(varied) if varied else "none"
+        raise ValueError(f"x: found {found} with more than one value; expected the name of one, and one task for each of its values")
+    x = varied[0] if x is None else x
+    if x not in _options_of(rows):
+        raise ValueError(f"x: found {x!r}; expected one of {', '.join(_options_of(rows))}")
+    tasks = rows.groupby("task")[x].first()
+    if (double := tasks[tasks.duplicated(keep=False)]).size:
+        same = " and ".join(map(str, tasks[tasks == double.iloc[0]].index[:2]))
+        others = ", ".join(name for name in varied if name != x) or "another tag"
+        raise ValueError(f"x: found tasks {same} with the same {x}; expected different ones: select rows by {others}")
+    height = _plots.height_of(rows["name"].nunique()) + (3.0 if "sigma" in rows else 0.6)
+    return _plots.sweep(rows, x, _plots.figure_of(7.0, height) if figure is None else figure)
+
+
+def _options_of(rows: pandas.DataFrame) -> list[str]:
+    """Names of the columns with tags and options."""
+    return [str(name) for name in rows.columns if name not in ("task", *FOUND)]
+
+
 def _index(frame: pandas.DataFrame, names: Sequence[str]) -> pandas.Index:
     import pandas
 
@@ -218,9 +284,9 @@ def _chunks(tasks: Iterable[Mapping[str, Any]]) -> Iterator[list[tuple[int, Any]
         yield chunk
 
 
-def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, list[dict[str, Any]]]]:
-    """Rows of some tasks."""
-    found = []
+def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, list[dict[str, Any]] | Ended]]:
+    """Rows of some tasks, up to the first with an error unless these are recorded."""
+    found: list[tuple[int, list[dict[str, Any]] | Ended]] = []
     for number, given in chunk:
         asked = _asked(number, stand_in(given, number))
         try:
@@ -229,7 +295,7 @@ def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, li
             rows = judged_rows(task)
         except INPUT as problem:
             if not record:
-                raise
+                return [*found, (number, Ended(given, error=problem))]
             rows = [{**dict.fromkeys(FOUND), "error": said(problem)}]
         found.append((number, [{**asked, **row} for row in rows]))
     return found
@@ -268,5 +334,5 @@ def _frame(rows: list[dict[str, Any]]) -> pandas.DataFrame:
     frame = pandas.DataFrame(rows, columns=[*names, *FOUND])
     for name, kind in _WIDTH.items():
         frame[name] = frame[name].astype(kind)
-    unused = [name for name in ("sigma", "unit", "outcome", "error") if frame[name].isna().all()]
+    unused = [name for name in ("sigma", "unit", "outcome", "rounded", "error") if frame[name].isna().all()]
     return frame.drop(columns=unused)

@@ -39,11 +39,17 @@ from ._executors import Executors, RayExecutor, check_main, processes
 from ._files import place
 from ._judged import COLUMNS, FOUND, WHAT, Chunk, Judged, judge, name_of, parquet, row_of
 from ._judged import done as there_in
-from ._sweeps import read, table, threads, to_xarray
+from ._sweeps import plot, read, table, threads, to_xarray
 from ._work import END, INPUT, CampaignError, Ended, Work
 
 __all__ = ["CampaignError", "Executors", "RayExecutor"]
-__all__ += ["design", "grid", "processes", "read", "run", "sweep", "table", "threads", "to_xarray"]
+__all__ += ["design", "grid", "plot", "processes", "read", "run", "sweep", "table", "threads", "to_xarray"]
+
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
 
 #: Seconds of work per file of a sweep, if the size of chunks follows the measured time.
 FILE_SECONDS = 10.0
@@ -99,11 +105,11 @@ def run(
     work = Work(function, lambda: next(left, END), executor, retries, ahead)
     for end in work.ended():
         if end.error is not None:
-            raise _failed(end, repr(end.task), work)
+            raise failed(end, repr(end.task), work)
         yield end.task, end.result
 
 
-def _failed(end: Ended, name: str, work: Work | None = None) -> Exception:
+def failed(end: Ended, name: str, work: Work | None = None) -> Exception:
     """Error that names its task: an error of input keeps its type, with the task before its text."""
     error = end.error
     assert error is not None
@@ -205,7 +211,7 @@ def design(
         if isinstance(end.error, INPUT):
             raise end.error
         if end.error is not None:
-            raise _failed(end, f"part {i} of {parts}", work)
+            raise failed(end, f"part {i} of {parts}", work)
         text, complete = end.result
         try:
             place(files[i], text.encode())
@@ -421,7 +427,7 @@ def _sweep(
         """Records the error of a task without an answer in a separate file, or raises it."""
         assert end.error is not None
         if not record:
-            raise _failed(Ended(task, error=end.error, tries=end.tries), name_of(task), work)
+            raise failed(Ended(task, error=end.error, tries=end.tries), name_of(task), work)
         name = digest(["error", name_of(task)])
         place(folder / f"{name}.parquet", parquet([row_of(task, end.error)], columns))
 

@@ -91,7 +91,7 @@ def test_replacing_a_key_is_writing_it() -> None:
             scheme = obsdeg.Scheme.read(file)
             assert obsdeg.analyze(scheme.replace(), **asked).json() == obsdeg.analyze(scheme, **asked).json(), file
     fewer = bench.replace(positions=bench.positions[:2])
-    assert len(fewer) == 2 and "dwell_s" in fewer.text and 'name = "p2"' in fewer.text and bench.text.count("[[position]]") == 6
+    assert tuple(fewer) == bench.positions[:2] and len(fewer) == 2 and "dwell_s" in fewer.text and 'name = "p2"' in fewer.text and bench.text.count("[[position]]") == 6
     with pytest.raises(ValueError, match="carry: found 'sideways'"):
         bench.replace(carry="sideways")
     with pytest.raises(obsdeg.ProblemError, match="unknown key `dwel_s`"):
@@ -237,8 +237,9 @@ def test_where_rounding_is_said() -> None:
     answer = obsdeg.analyze([(third, 0, 0)], latitude=100 * third, solutions=False)
     said = "Rounded before it was judged: alpha of position 1: 1/3 taken as 0.333333333 and 1 more"
     assert said in repr(answer) and str(answer).endswith(f"{said}\n") and said in answer._repr_html_()
-    # the bytes of the command line do not change
-    assert said not in answer.text() and said not in answer.json()
+    # texts for people say it; JSON and CSV are those of the command line
+    assert all(answer.text(of).endswith(f"{said}\n") for of in ("table", "markdown"))
+    assert said not in answer.json() + answer.text("csv") + answer.text("latex")
     assert pickle.loads(pickle.dumps(answer)).rounded == answer.rounded
     assert obsdeg.analyze([(0.123456, 0, 0)], digits=2, solutions=False).rounded[0].taken == "0.12"
     assert obsdeg.analyze([(2.5, 0, 0), (3.5, 0, 0)], digits=0, solutions=False).rounded[1].taken == "4"

@@ -128,7 +128,7 @@ def test_without_matplotlib_it_is_said() -> None:
         "except ImportError as e: print(e)\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=120)
-    assert done.stdout.strip() == "plot() draws with the package `matplotlib`, which is not installed: pip install 'obsdeg[plots]'"
+    assert done.stdout.strip() == "plot() needs the package `matplotlib`, which is not installed: pip install 'obsdeg[plots]'"
 
 
 def test_importing_loads_none_of_what_is_optional() -> None:

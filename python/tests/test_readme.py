@@ -11,7 +11,7 @@ from pathlib import Path
 import obsdeg
 import pytest
 from conftest import ROOT
-from obsdeg import options
+from obsdeg import campaign, options
 
 PAGES = ["README.md", "python/README.md", "book/src/python.md"]
 
@@ -33,11 +33,21 @@ def test_docstrings_print_what_they_show(module: str) -> None:
     assert doctest.testmod(importlib.import_module(module), optionflags=doctest.ELLIPSIS).failed == 0
 
 
+#: Answers whose examples are those of their commands.
+_WITHOUT = (
+    *(obsdeg.Answer, obsdeg.Judgement, obsdeg.Part, obsdeg.Report, obsdeg.Walks),
+    *(obsdeg.SystemCalibration, obsdeg.SystemEvidence, obsdeg.SystemRun),
+)
+
+
 def test_every_command_and_object_shows_an_example() -> None:
     of = [getattr(obsdeg, name) for name in obsdeg.__all__]
     functions = [f for f in of if inspect.isfunction(f)]
     assert len(functions) >= 9
-    for one in [*functions, obsdeg.Scheme, obsdeg.Model, obsdeg.Scheme.replace, obsdeg.Model.replace, obsdeg.Answer.from_json]:
+    answers = [a for a in of if inspect.isclass(a) and issubclass(a, obsdeg.Answer) and a not in _WITHOUT]
+    assert len(answers) >= 12
+    of_sweeps = [campaign.table, campaign.read, campaign.to_xarray, campaign.plot]
+    for one in [*functions, *answers, *of_sweeps, obsdeg.Scheme, obsdeg.Model, obsdeg.Scheme.replace, obsdeg.Model.replace, obsdeg.Answer.from_json]:
         assert "Examples\n" in one.__doc__ and ">>> " in one.__doc__, one
 
 

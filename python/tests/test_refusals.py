@@ -158,3 +158,34 @@ def test_a_function_of_time_without_a_meaning() -> None:
     assert [answer.statuses["k"] for answer in of_inputs] == ["observable", "not_seen"]
     # functions as keys
     assert obsdeg.analyze(obsdeg.Model(states={x(t): -k * x(t)}, outputs={"y": x(t)})).degrees == {"x": 0, "k": 1}
+
+
+def test_kinds_of_options_are_said_in_words() -> None:
+    for options, message in (
+        (dict(seed="abc"), "seed: found the text \"abc\"; expected a whole number, not negative"),
+        (dict(seed=-1), "seed: found the number -1; expected a whole number, not negative"),
+        (dict(solutions="yes"), "solutions: found the text \"yes\"; expected true or false"),
+    ):
+        with pytest.raises(obsdeg.ProblemError) as raised:
+            obsdeg.analyze(PAIR, **options)  # type: ignore[call-overload]
+        assert str(raised.value) == message
+    with pytest.raises(obsdeg.ProblemError, match='dwell: found the text "long"; expected a number'):
+        obsdeg.simulate(PAIR, dwell="long")  # type: ignore[call-overload]
+
+
+def test_exports_take_models_only() -> None:
+    for export in (importers.to_si_jl, importers.to_sympy):
+        for wrong in (3, obsdeg.Scheme(PAIR), None):
+            with pytest.raises(TypeError, match=f"found a {type(wrong).__name__}; expected a Model"):
+                export(wrong)  # type: ignore[arg-type]
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    answer = obsdeg.analyze(PAIR)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    for use, call in (("to_frame()", answer.to_frame), ("a table of a sweep", lambda: campaign.table([]))):
+        with pytest.raises(ImportError) as raised:
+            call()
+        assert str(raised.value) == f"{use} needs the package `pandas`, which is not installed: pip install 'obsdeg[frames]'"

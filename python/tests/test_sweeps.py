@@ -58,8 +58,10 @@ def test_errors_are_rows() -> None:
     assert list(wrong.index) == [1, 2, 3, 4] and rows["error"].isna().sum() == 15
     for number, part in {1: "95 is out of range", 2: "found 2 angles", 3: "no option `latitud`", 4: "a scheme and a model"}.items():
         assert part in wrong[number]
-    with pytest.raises(obsdeg.ProblemError, match="95 is out of range"):
+    with pytest.raises(obsdeg.ProblemError, match="95 is out of range") as raised:
         campaign.table(tasks[:2], errors="raise")
+    # named by its number, not by the whole chunk
+    assert str(raised.value).startswith("task 1: ") and raised.value.task == tasks[1]
     with pytest.raises(ValueError, match="errors: found 'ignore'"):
         campaign.table([], errors="ignore")  # type: ignore[arg-type]
 
@@ -80,6 +82,24 @@ def test_a_folder_is_read_as_the_same_table(tmp_path: Path) -> None:
     files = {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.parquet")}
     campaign.sweep(tmp_path, tasks, errors="record", executor=lambda: ThreadPoolExecutor(1))
     assert {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.parquet")} == files
+
+
+def test_rounded_angles_are_listed(tmp_path: Path) -> None:
+    tasks = [dict(angles=[*PAIR, (x, 0, 0)], tags={"x": x}) for x in (30, 0.1 + 0.2)]
+    for executor in (campaign.threads, campaign.processes):
+        rows = campaign.table(tasks, executor=executor)
+        assert rows[rows["task"] == 0]["rounded"].isna().all()
+        (text,) = rows[rows["task"] == 1]["rounded"].unique()
+        assert "0.30000000000000004" in text and text == str(obsdeg.Scheme(tasks[1]["angles"]).rounded[0])  # type: ignore[arg-type]
+    campaign.sweep(tmp_path, tasks, executor=campaign.threads)
+    assert set(campaign.read(tmp_path)["rounded"].dropna()) == {text}
+    assert "rounded" not in campaign.table(tasks[:1])
+    # a folder of before has no such column
+    import pyarrow.parquet
+
+    for file in tmp_path.glob("*.parquet"):
+        pyarrow.parquet.write_table(pyarrow.parquet.read_table(file).drop_columns(["rounded"]), file)
+    assert "rounded" not in campaign.read(tmp_path) and len(campaign.read(tmp_path)) == len(rows)
 
 
 def test_a_table_by_processes() -> None:
@@ -149,3 +169,39 @@ def test_what_is_no_sweep(tmp_path: Path) -> None:
     for tasks in (3, {"angles": [(0, 0, 0)]}):
         with pytest.raises(TypeError, match="expected a list or another iterable of mappings"):
             campaign.table(tasks)  # type: ignore[arg-type]
+    assert dir(campaign) == sorted(campaign.__all__)
+
+
+def test_pictures_of_sweeps() -> None:
+    pytest.importorskip("matplotlib").use("Agg")
+    tasks: list[dict[str, Any]] = [dict(angles=[*PAIR, (x, 0, 0)], latitude=at, tags={"x": x}) for x in (0, 30, 60) for at in (0, 45)]
+    rows = campaign.table(tasks)
+    one = rows[rows["latitude"] == 45]
+    (axes,) = campaign.plot(one)
+    names = [text.get_text() for text in axes.get_yticklabels()]
+    assert names == one["name"].unique().tolist() and [text.get_text() for text in axes.get_xticklabels()] == ["0", "30", "60"]
+    grid = axes.get_images()[0].get_array()
+    for i, name in enumerate(names):
+        for j, x in enumerate((0, 30, 60)):
+            degree = one[(one["name"] == name) & (one["x"] == x)]["degree"].item()
+            assert bool(numpy.ma.getmaskarray(grid)[i, j]) == bool(pandas.isna(degree))
+            assert pandas.isna(degree) or grid[i, j] == degree
+    with pytest.raises(ValueError, match="x: found x, latitude with more than one value; expected the name of one"):
+        campaign.plot(rows)
+    with pytest.raises(ValueError, match="tasks 0 and 1 with the same x; expected different ones: select rows by latitude"):
+        campaign.plot(rows, "x")
+    with pytest.raises(ValueError, match="x: found 'y'; expected one of x, latitude"):
+        campaign.plot(rows, "y")
+    with pytest.raises(ValueError, match="rows: found the columns a; expected a table"):
+        campaign.plot(pandas.DataFrame({"a": [1]}))
+    scheme = obsdeg.Scheme(PAIR, carry="inertial", latitude=28.2)
+    runs = campaign.table(dict(scheme=scheme, noise=noise) for noise in (1e-5, 2e-5, 4e-5))
+    above, below = campaign.plot(runs)
+    assert below.get_xlabel() == above.get_xlabel() == "noise"
+    drawn = {line.get_label(): list(line.get_ydata()) for line in below.get_lines()}
+    own = runs[runs["name"] == "D_FX"]
+    assert drawn[f"D_FX [{own['unit'].iloc[0]}]"] == own["sigma"].tolist()
+    # texts in the order of the table
+    models = [dict(model=obsdeg.Model(states={"x": "-k*x"}, outputs={"y": y}), tags={"seen": y}) for y in ("x", "k*x", "k")]
+    (axes,) = campaign.plot(campaign.table(models))
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["x", "k*x", "k"]

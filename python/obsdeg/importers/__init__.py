@@ -19,10 +19,15 @@ from .._files import TEXT, read_text
 from .problem import ImportProblem
 
 if TYPE_CHECKING:
+    from .exporters import to_si_jl as to_si_jl
+    from .exporters import to_sympy as to_sympy
     from .system import System as System
     from .system import to_toml as to_toml
 
 __all__ = ["ImportProblem", "Imported", "load"]
+
+#: Names of modules that import SymPy.
+_LATER = {"System": ".system", "to_toml": ".system", "to_si_jl": ".exporters", "to_sympy": ".exporters"}
 
 
 @dataclass(frozen=True)
@@ -106,8 +111,8 @@ def _own(text: str, path: Path) -> None:
 
 def __getattr__(name: str) -> Any:
     # SymPy is imported when something is read
-    if name in ("System", "to_toml"):
-        return getattr(importlib.import_module(".system", __name__), name)
+    if name in _LATER:
+        return getattr(importlib.import_module(_LATER[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -12,6 +12,7 @@ import sympy  # type: ignore[import-untyped]
 
 from .. import _toml
 from .._files import Text
+from .._scheme import Scheme
 from .formula import TIME, Expr, exact, expand, parse, put, text_of
 from .problem import ImportProblem
 from .system import State, System
@@ -29,6 +30,9 @@ def read_model(model: str | Text) -> System:
             supports.
     """
     text = model.text if isinstance(model, Text) else model
+    if not isinstance(text, str) or isinstance(model, Scheme):
+        found = f"a {type(model).__name__}"
+        raise TypeError(f"found {found}; expected a Model, the text of a model file, or a system of the importers")
     if text.lstrip().startswith("{"):
         return _json(text)
     try:
