@@ -1071,7 +1071,7 @@ class SystemQuantity(Record):
     name: str
     """Name of the unknown, as in the model."""
     kind: str
-    """Kind of the unknown: state, parameter or input."""
+    """Kind of the unknown: state, algebraic, parameter or input."""
     unit: str
     """Unit of the unknown, as in the model file."""
     description: str

@@ -478,7 +478,7 @@ fn constraints_that_cannot_hold_are_named() {
         ("['exp(x) = 2']", "a function; expected + - * / and whole powers"),
         ("['x = u']", "`u` is an input; expected states, parameters and constants"),
         ("['x = t']", "`t` is the time"),
-        ("['x = z']", "`z` is a state whose start is given"),
+        ("['z = 2']", "nothing unknown; expected states or parameters in it"),
         ("['2*k = 6']", "nothing unknown; expected states or parameters in it"),
         ("['x = w']", "`w` is not known here"),
         ("['p = x']", "expected the same shape on both sides of `-`, found a vector of 2 - a scalar"),
@@ -493,6 +493,27 @@ fn constraints_that_cannot_hold_are_named() {
         assert!(e.message.contains(message) && e.what.starts_with("the constraint"), "{constraints}: {e}");
         assert!(e.span.is_some(), "{constraints}: {e}");
     }
+}
+
+/// In a constraint a given start stands for its state.
+#[test]
+fn constraints_with_given_starts() {
+    let held = |constraint: &str, start: &str| {
+        let states = format!("x='-a*x*z'\nz={{equation='-b*z', initial={start}}}");
+        let text = format!(
+            "name='c'\nparameters=['a', 'b']\nconstraints=['{constraint}']\n[states]\n{states}\n[outputs]\ny='x*b'"
+        );
+        degrees(&judged(&text))
+    };
+    let degree_of = |constraint: &str, start: &str, name: &str| {
+        held(constraint, start).into_iter().find(|q| q.0 == name).expect("an unknown").1
+    };
+    for (with, without, start) in
+        [("x = z", "x = 2", "2"), ("x*z = 3", "x*5 = 3", "5"), ("x + z = 4*a", "x + a*b = 4*a", "'a*b'")]
+    {
+        assert_eq!(held(with, start), held(without, start), "{with}");
+    }
+    assert_eq!(degree_of("x = z", "2", "b"), Some(0));
 }
 
 /// Experiments with different constants and inputs equal one system with separate states for each.

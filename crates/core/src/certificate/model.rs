@@ -122,10 +122,11 @@ pub fn certify_model(model: &SystemModel, seed: u64) -> Result<ModelCertificate,
 
 /// Refuses models that the layout does not cover, before any verdict.
 fn check_shape(model: &SystemModel, compiled: &Compiled) -> Result<(), CertificateError> {
-    let expected = "one experiment in one segment without constraints";
+    let expected = "one experiment in one segment without constraints and algebraic equations";
     let cases = [
         (model.experiments > 1, "several experiments"),
         (!model.segments.is_empty(), "segments"),
+        (!model.algebraic.is_empty(), "algebraic equations"),
         (!model.constraints.is_empty(), "constraints"),
     ];
     if let Some((_, found)) = cases.into_iter().find(|case| case.0) {

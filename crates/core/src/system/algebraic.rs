@@ -287,6 +287,11 @@ impl Differentiation<'_> {
 }
 
 impl SystemModel {
+    /// True if a state is an unknown of the algebraic equations.
+    pub(super) fn is_algebraic(&self, state: usize) -> bool {
+        self.algebraic.iter().any(|a| a.named.name == self.states[state].named.name)
+    }
+
     /// The model with a state for every algebraic unknown; itself without any.
     ///
     /// # Errors

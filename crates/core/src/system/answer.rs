@@ -140,7 +140,7 @@ pub struct DigitsReport {
 pub struct SystemQuantity {
     /// Name of the unknown, as in the model.
     pub name: String,
-    /// Kind of the unknown: state, parameter or input.
+    /// Kind of the unknown: state, algebraic, parameter or input.
     pub kind: String,
     /// Unit of the unknown, as in the model file.
     pub unit: String,
@@ -411,6 +411,7 @@ fn number_of_solutions(count: Count, unique: bool) -> NumberOfSolutions {
 /// Verdict on unknown c, without its solutions.
 fn quantity(model: &SystemModel, judged: &Judgement, c: usize, unknown: &Unknown) -> SystemQuantity {
     let (kind, named) = match unknown.role {
+        Role::State(i) if model.is_algebraic(i) => ("algebraic", &model.states[i].named),
         Role::State(i) => ("state", &model.states[i].named),
         Role::Parameter(i) => ("parameter", &model.parameters[i]),
         Role::UnknownInput(i) => ("input", &model.unknown_inputs[i].0),

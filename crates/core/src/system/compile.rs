@@ -10,10 +10,18 @@ use super::model::{
     Compiled, CompiledExperiment, CompiledSegment, FilePlace, KnownInput, MAX_NODES, ModelSegment,
     PlacedExpression, Role, StateStart, SystemModel,
 };
-use crate::language::{among, nearest};
+use crate::language::{Node, among, nearest};
 
 /// Nodes by name.
 type NodesByName = HashMap<String, usize>;
+
+/// Names in a formula.
+fn names_of(formula: &PlacedExpression) -> impl Iterator<Item = &str> {
+    formula.expression.nodes.iter().filter_map(|node| match node {
+        Node::Name(name) => Some(name.as_str()),
+        _ => None,
+    })
+}
 
 impl SystemModel {
     /// Graph of a model without faults in its names.
@@ -24,7 +32,8 @@ impl SystemModel {
         let starts = compiler.starts(&start_names)?;
         compiler.check_own_constants()?;
         let segments = compiler.segments(&names, &start_names)?;
-        let constraints = compiler.constraints(&names)?;
+        let kept = compiler.nodes(&self.constraints, &names)?;
+        let constraints = compiler.constraints(&names, &starts)?;
         let not_negative = compiler.nodes(&self.not_negative, &names)?;
         let combinations = compiler.nodes(&self.combinations, &names)?;
         Ok(Compiled {
@@ -34,6 +43,7 @@ impl SystemModel {
             starts,
             segments,
             constraints,
+            kept,
             not_negative,
             combinations,
             places: compiler.places,
@@ -278,10 +288,40 @@ impl<'m> Compiler<'m> {
         Ok(compiled)
     }
 
-    /// Nodes of the constraints, each checked once it is made.
-    fn constraints(&mut self, names: &NodesByName) -> Result<Vec<usize>, ModelError> {
+    /// Names at the start of a run, with the given starts instead of their states, and the definitions that
+    /// the constraints use.
+    fn names_at_start(
+        &mut self,
+        names: &NodesByName,
+        starts: &[Option<usize>],
+    ) -> Result<NodesByName, ModelError> {
+        let model = self.model;
+        let mut out = names.clone();
+        let given = model.states.iter().zip(starts).filter_map(|(s, node)| Some((&s.named.name, (*node)?)));
+        out.extend(given.map(|(name, node)| (name.clone(), node)));
+        let mut used: HashSet<&str> = model.constraints.iter().flat_map(names_of).collect();
+        for (name, formula) in model.definitions.iter().rev() {
+            if used.contains(name.as_str()) {
+                used.extend(names_of(formula));
+            }
+        }
+        for (name, formula) in model.definitions.iter().filter(|d| used.contains(d.0.as_str())) {
+            let value = self.node(formula, &out)?;
+            out.insert(name.clone(), value);
+        }
+        Ok(out)
+    }
+
+    /// Nodes of the constraints at the start, each checked once it is made.
+    fn constraints(
+        &mut self,
+        names: &NodesByName,
+        starts: &[Option<usize>],
+    ) -> Result<Vec<usize>, ModelError> {
         let model = self.model;
         let mut constraints = Vec::new();
+        let names =
+            if starts.iter().any(Option::is_some) { &self.names_at_start(names, starts)? } else { names };
         for formula in &model.constraints {
             let made = self.node(formula, names)?;
             self.check_constraint(made, formula)?;
@@ -290,8 +330,8 @@ impl<'m> Compiler<'m> {
         Ok(constraints)
     }
 
-    /// Checks that a constraint is rational in states whose start is not given, parameters and constants,
-    /// and that its value can change.
+    /// Checks that a constraint at the start is rational in states, parameters and constants, and that its
+    /// value can change.
     fn check_constraint(&self, node: usize, formula: &PlacedExpression) -> Result<(), ModelError> {
         let dag = &self.dag;
         let refuse = |message: String| Err(formula.place.error(message, 0..formula.text.len()));
@@ -305,9 +345,6 @@ impl<'m> Compiler<'m> {
         for slot in slots_of(dag, node) {
             let (name, role) = &self.roles[slot];
             let kind = match role {
-                Role::State(i) if matches!(self.model.states[*i].start, StateStart::Value(_)) => {
-                    "a state whose start is given"
-                }
                 Role::State(_) | Role::Parameter(_) => {
                     moves = true;
                     continue;

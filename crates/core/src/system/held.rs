@@ -24,8 +24,41 @@ impl<S: Values> PointBuilder<'_, '_, S> {
         rng: &mut SplitMix64,
         attempt: usize,
     ) -> Result<(), Singular> {
+        let all = self.free(point.experiment);
+        // shared values were changed in the first experiment
+        let shared = |role: &Role| !matches!(role, Role::State(_));
+        let own = all.iter().zip(&self.compiled.roles).map(|(free, role)| *free && (first || !shared(role)));
+        self.hold(point, &self.compiled.constraints, (&all, &own.collect::<Vec<_>>()), (rng, attempt))
+    }
+
+    /// Changes every state and parameter so that the constraints of the motion hold; their differentials by
+    /// the `lanes` of the point. `None` without constraints, or if the motion does not keep them.
+    pub(super) fn hold_kept(
+        &self,
+        point: &mut Point<S>,
+        lanes: usize,
+        rng: &mut SplitMix64,
+        attempt: usize,
+    ) -> Result<Option<Rows<S>>, Singular> {
+        let mut free = self.free(point.experiment);
+        for (slot, role) in self.compiled.roles.iter().enumerate() {
+            free[slot] |= matches!(role, Role::State(_));
+        }
+        self.hold(point, &self.compiled.kept, (&free, &free), (rng, attempt))?;
+        let (rows, kept) = self.constraints(point, lanes)?;
+        Ok((kept && !rows.is_empty()).then_some(rows))
+    }
+
+    /// Changes the `free` slots so that some constraints hold, which are independent in the slots `all`.
+    fn hold(
+        &self,
+        point: &mut Point<S>,
+        constraints: &[usize],
+        (all, free): (&[bool], &[bool]),
+        (rng, attempt): (&mut SplitMix64, usize),
+    ) -> Result<(), Singular> {
         let compiled = self.compiled;
-        if compiled.constraints.is_empty() {
+        if constraints.is_empty() {
             return Ok(());
         }
         let value = |slot: usize| match (&point.signals[slot], &point.initial[slot]) {
@@ -34,21 +67,16 @@ impl<S: Values> PointBuilder<'_, '_, S> {
             _ => self.field.zero(),
         };
         let mut values: Vec<S::Element> = (0..compiled.roles.len()).map(value).collect();
-        // shared values were changed in the first experiment
-        let all = self.free(point.experiment);
-        let shared = |role: &Role| !matches!(role, Role::State(_));
-        let free: Vec<bool> =
-            all.iter().zip(&compiled.roles).map(|(free, role)| *free && (first || !shared(role))).collect();
         let mut own = SplitMix64::new(rng.next_u64());
         if attempt.is_multiple_of(2) {
             let bits = CLOSE[attempt / 2 % CLOSE.len()];
-            self.near_given(point.experiment, &free, &mut values, bits, &mut own);
+            self.near_given(point.experiment, free, &mut values, bits, &mut own);
         }
-        let distinct = turned(distinct(&compiled.constraints), attempt);
-        let place = |c: usize| compiled.constraints.iter().position(|node| *node == distinct[c]).unwrap_or(0);
-        let held = self.field.hold(&compiled.dag, &distinct, &mut values, &free, &mut own, self.work);
+        let distinct = turned(distinct(constraints), attempt);
+        let place = |c: usize| constraints.iter().position(|node| *node == distinct[c]).unwrap_or(0);
+        let held = self.field.hold(&compiled.dag, &distinct, &mut values, free, &mut own, self.work);
         held.map_err(|reason| reason.of(place))?;
-        let independent = self.independent(&distinct, &values, &all)?;
+        let independent = self.independent(&distinct, &values, all)?;
         if independent.len() + self.layout.dependent < distinct.len() {
             let dependent = (0..distinct.len()).find(|c| !independent.contains(c)).unwrap_or(0);
             return Err(Singular::Dependent(place(dependent)));
@@ -131,11 +159,11 @@ impl<S: Values> PointBuilder<'_, '_, S> {
         Ok(out)
     }
 
-    /// Differentials of the constraints, and true if their first time derivatives are zero here. The motion
-    /// then keeps them, and the point is generic among those where they hold.
-    pub(super) fn constraints(&self, point: &Point<S>) -> Result<(Rows<S>, bool), Singular> {
-        let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
-        if compiled.constraints.is_empty() {
+    /// Differentials of the constraints by the `lanes` of the point, and true if their first time derivatives
+    /// are zero here. The motion then keeps them, and the point is generic among those where they hold.
+    pub(super) fn constraints(&self, point: &Point<S>, lanes: usize) -> Result<(Rows<S>, bool), Singular> {
+        let (compiled, f) = (self.compiled, &self.field);
+        if compiled.kept.is_empty() {
             return Ok((Vec::new(), true));
         }
         let mut seen = Taylor::new(
@@ -144,15 +172,15 @@ impl<S: Values> PointBuilder<'_, '_, S> {
             lanes,
             point.signals.clone(),
             &point.initial,
-            &compiled.constraints,
+            &compiled.kept,
             true,
             SplitMix64::new(point.seed),
             self.work,
         )?;
         let row = |&node: &usize| dense(f, lanes, seen.lanes_of(node), seen.dual(node, 0));
-        let rows = compiled.constraints.iter().map(row).collect();
+        let rows = compiled.kept.iter().map(row).collect();
         seen.advance();
-        let kept = compiled.constraints.iter().all(|&node| f.is_zero(&seen.value(node, 1)));
+        let kept = compiled.kept.iter().all(|&node| f.is_zero(&seen.value(node, 1)));
         Ok((rows, kept))
     }
 }

@@ -305,8 +305,10 @@ pub struct Compiled {
     pub starts: Vec<Option<usize>>,
     /// Nodes of constants and of carried states, per segment.
     pub segments: Vec<CompiledSegment>,
-    /// Nodes of the constraints: zero at the start.
+    /// Nodes of the constraints at the start, with given starts in place of their states: zero.
     pub constraints: Vec<usize>,
+    /// Nodes of the constraints in all states, which the motion may keep.
+    pub kept: Vec<usize>,
     /// Nodes that are not negative where the constraints hold.
     pub not_negative: Vec<usize>,
     /// Nodes of the combinations.
@@ -375,6 +377,7 @@ impl Compiled {
             starts: given(&self.starts),
             segments: self.segments.iter().map(segment).collect(),
             constraints: all(&self.constraints),
+            kept: all(&self.kept),
             not_negative: all(&self.not_negative),
             combinations: all(&self.combinations),
             places: self.places.iter().map(|(i, place)| (nodes[*i], place.clone())).collect(),

@@ -442,7 +442,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
             }
         }
         self.set_states(&mut point, &given(&compiled.starts))?;
-        let (known, kept) = self.constraints(&point)?;
+        let (known, kept) = self.constraints(&point, self.layout.unknowns.len())?;
         let generic = kept && self.model.states.iter().all(|s| s.start == StateStart::Unknown);
         Ok(SegmentStart { point, known, generic, time: shared.time })
     }

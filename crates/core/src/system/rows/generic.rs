@@ -7,7 +7,7 @@ use super::super::model::Role;
 use super::super::taylor::{Signal, Singular, Taylor};
 use super::super::values::Values;
 use super::super::work::{WorkStep, product};
-use super::{Point, PointBuilder, cost_of, rows_of};
+use super::{Point, PointBuilder, Rows, cost_of, rows_of};
 
 /// Spans of the rows of a run at a generic point, one per group of outputs.
 struct GenericSpans<S: Values> {
@@ -41,7 +41,8 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
     /// Upper bounds on the ranks of a run's rows, of all outputs together or (`apart`) of each. They are the
     /// ranks at a generic point, where every state is an unknown, the time is arbitrary, and the first order
     /// that adds nothing is the last, multiplied by the derivatives of the run's states by the unknowns. A
-    /// minor that is not zero at the run's own point is not zero there either.
+    /// minor that is not zero at the run's own point is not zero there either. Constraints that the motion
+    /// keeps hold at that point too.
     pub(super) fn generic_ranks(
         &self,
         point: &Point<S>,
@@ -55,21 +56,49 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
             (0..self.model.states.len()).filter_map(|i| self.slot_of(Role::State(i))).collect();
         let lanes = unknowns + states.len();
         for attempt in 0..S::ATTEMPTS {
-            let generic = self.generic_point(point, &states, rng, attempt);
-            let taylor = match self.series(&generic, lanes) {
-                Ok(taylor) => taylor,
+            let drawn = self.generic_point(point, &states, rng, attempt);
+            let found = self.on_constraints(drawn, lanes, rng, attempt).and_then(|(generic, rows)| {
+                let taylor = self.series(&generic, lanes)?;
+                Ok((taylor, generic, rows))
+            });
+            let (taylor, generic, kept) = match found {
+                Ok(found) => found,
                 Err(Singular::Refused) => return None,
                 Err(_) => continue,
             };
             let adjoint = self.adjoint(&generic, lanes);
             let mut spans = GenericSpans::new(&self.field, unknowns, lanes, groups);
-            for row in known {
+            for row in &kept {
+                spans.whole.iter_mut().for_each(|space| _ = space.insert(row));
+                let row = self.through_states(row, point, &states);
+                spans.seen.iter_mut().for_each(|space| _ = space.insert(&row));
+            }
+            for row in known.iter().filter(|_| kept.is_empty()) {
                 spans.seen.iter_mut().for_each(|space| _ = space.insert(row));
             }
             self.fill(&mut spans, (taylor, adjoint), point, &states)?;
             return Some((spans.seen.iter().map(RowSpace::rank).collect(), spans.gap()));
         }
         None
+    }
+
+    /// A generic point where the constraints hold, with their differentials, if the motion keeps them: there
+    /// the first order that adds nothing to these is the last. Otherwise the point itself, without any.
+    fn on_constraints(
+        &self,
+        generic: Point<S>,
+        lanes: usize,
+        rng: &mut SplitMix64,
+        attempt: usize,
+    ) -> Result<(Point<S>, Rows<S>), Singular> {
+        let mut held = generic.clone();
+        let rows = match self.hold_kept(&mut held, lanes, rng, attempt) {
+            Err(singular) if singular == Singular::Refused || attempt + 1 < S::ATTEMPTS => {
+                return Err(singular);
+            }
+            found => found.ok().flatten(),
+        };
+        Ok(rows.map_or((generic, Vec::new()), |rows| (held, rows)))
     }
 
     /// The point with random values instead of all that are unknown or change, and the states in the slots
