@@ -238,6 +238,7 @@ fn chapters() -> Vec<PathBuf> {
 /// The shown expressions need the symbolic engine.
 #[cfg(feature = "symbolica")]
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn every_command_runs_and_prints_what_is_shown() {
     let texts: Vec<PathBuf> = std::iter::once(root().join("README.md")).chain(chapters()).collect();
     let wrong: Vec<String> = std::thread::scope(|scope| {

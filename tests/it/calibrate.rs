@@ -117,6 +117,7 @@ fn another(text: &str) -> String {
 /// A review shows the calibration beside the predictions for the scheme, in every format. Files that are no
 /// calibration are refused.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn a_review_of_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();

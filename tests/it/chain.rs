@@ -296,6 +296,7 @@ fn by_normal_equations(left_out: usize) -> Vec<f64> {
 /// `procedure`, `design` and the engine of the page give the same uncertainty of every coefficient. Its sigma
 /// is larger than with all samples; a total with a bench need not be.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn samples_that_the_record_leaves_out_count_nowhere() {
     let positions = ["NUE", "USE", "EDN", "WND", "DNE"].map(|n| format!("[[position]]\nattitude = '{n}'\n"));
     let slews = "slew_rate_deg_s = 2\n";

@@ -219,6 +219,7 @@ fn all_tried(step: usize) -> usize {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn expressions_of_models_solve_and_do_not_rest_on_themselves() {
     assert!(all_tried(4) > 70);
     for name in ["bruno2016", "two_state_feedforward_no_input"] {

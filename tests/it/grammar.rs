@@ -243,6 +243,7 @@ fn options(command: &str) -> BTreeMap<String, bool> {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn no_command_line_of_the_grammar_meets_a_defect() {
     let commands = [
         "analyze",

@@ -115,6 +115,7 @@ fn assert_status(page: &Html, verdict: &str) {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn every_eighth_example_has_a_report() {
     have_reports(8);
 }
@@ -267,6 +268,7 @@ fn the_papers_case_is_one_valid_page_in_the_order_of_a_review() {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn a_verdict_leads_with_what_limits_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let five = "examples/five-positions/scheme.toml";
@@ -433,6 +435,7 @@ fn a_verdict_leads_with_what_limits_it() {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn text_from_files_is_text_in_every_format() {
     let folder = tempfile::tempdir().expect("a folder");
     let scheme = hostile(folder.path(), 12).display().to_string();

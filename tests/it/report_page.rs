@@ -119,6 +119,7 @@ fn generic_angles_are_reported() {
 
 #[test]
 #[expect(clippy::print_stderr, reason = "a skipped test says so")]
+#[ignore = "seconds: .ci/run"]
 fn a_browser_shows_it() {
     let Some(mut browser) = Browser::start() else {
         eprintln!("skipped: no Chromium on this machine");
@@ -511,6 +512,7 @@ fn smallest_text(browser: &mut Browser, file: &Path) -> f64 {
 /// pages answer the questions of a board, and no text of a picture is smaller than 6 pt (8 pixels).
 #[test]
 #[expect(clippy::print_stderr, reason = "a skipped test says so")]
+#[ignore = "seconds: .ci/run"]
 fn a_review_fits_its_pages() {
     let folder = tempfile::tempdir().expect("a folder");
     let example = |name: &str| format!("examples/{name}/scheme.toml");
@@ -620,6 +622,7 @@ fn an_output_to_drop_changes_no_verdict() {
 /// Answers hold for what was computed: a run that is not stated in full, equal schemes, a record that
 /// determines nothing.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn answers_say_no_more_than_was_computed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
@@ -793,6 +796,7 @@ fn a_model_says_what_to_know_beforehand() {
 
 /// The box of a calibration recommends an action for each doubt, or says that none is needed.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn a_calibration_says_what_to_do() {
     let folder = tempfile::tempdir().expect("a folder");
     let record = "examples/bench-day/record.csv";

@@ -1,5 +1,5 @@
-//! Tests of the workbench in a real browser: `cargo test --test page`, after `cargo run -p obsdeg-web` has built
-//! the page, which takes minutes. `cargo test` leaves them out.
+//! Tests of the workbench in a real browser: `cargo test --workspace --test page`, after `cargo run -p
+//! obsdeg-web` has built the page, which takes minutes. `cargo test` leaves them out.
 
 #[path = "../it/browser.rs"]
 mod browser;

@@ -1,4 +1,4 @@
-//! The extension module of the Python package `obsdeg`: commands by name, options as JSON. Everything else is
+//! Functions of the extension module: commands by name, options as JSON. Everything else is
 //! Python.
 
 use std::cell::RefCell;

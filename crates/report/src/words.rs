@@ -413,8 +413,8 @@ pub(crate) fn at_most(bound: f64) -> String {
     }
 }
 
-/// A bound on the probability of an error, after "a verdict is": `wrong with probability below 8e-23`. Numbers
-/// with very many digits leave none below one.
+/// A bound on the probability of an error, after "a verdict is": `wrong with probability below 8e-23`.
+/// Numbers with very many digits leave none below one.
 pub(crate) fn wrong_below(bound: f64) -> String {
     if bound < 1.0 {
         format!("wrong with probability below {}", at_most(bound))

@@ -295,6 +295,7 @@ proptest! {
     /// Model evidence a, b, c and the ranking agree with the exact verdicts on random schemes with whole
     /// degrees. The seeds are fixed, because one correct filter in three hundred leaves a band of 99.9 %.
     #[test]
+    #[ignore = "seconds: .ci/run"]
     fn random_schemes_agree(
         angles in prop::collection::vec(prop::array::uniform3(-18i32..18), 1..6),
         carry in prop::sample::select(Carry::ALL.to_vec()),

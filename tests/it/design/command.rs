@@ -87,6 +87,7 @@ fn an_interrupted_program_ends_with_130() {
 /// The file of the best scheme is accepted by `analyze` and has the promised sigma. Wrong arguments are
 /// named.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn the_winner_is_a_scheme_file() {
     let place = tempfile::tempdir().expect("a folder");
     let folder = place.path().join("found").display().to_string();

@@ -512,6 +512,7 @@ fn requalification_is_that_of_brute_force(tasks: std::ops::Range<u64>) {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn requalification_is_that_of_brute_force_in_some_tasks() {
     requalification_is_that_of_brute_force(0..8);
 }
@@ -571,6 +572,7 @@ fn promised_sigmas_are_kept(runs: u64) {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn promised_sigmas_are_kept_in_simulated_runs() {
     promised_sigmas_are_kept(60);
 }
@@ -624,9 +626,10 @@ fn calibrate_names_the_same_position() {
 /// ones, for random covariances. The bound is near the best of them where a dwell tells less than the
 /// calibration.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn no_attitude_is_better_than_the_bound() {
     let mut near = 0;
-    for seed in 0..4 {
+    for seed in 0..2 {
         let mut a = aged(seed);
         let mut rng = SplitMix64::new(900 + seed);
         let mut candidates = Candidates::default();
@@ -647,7 +650,7 @@ fn no_attitude_is_better_than_the_bound() {
         }
     }
     // what a cell may see at most grows with the information of a dwell
-    assert!(near >= 4, "{near} of 8");
+    assert!(near >= 2, "{near} of 4");
 }
 
 /// After the calibration of the bench: 744 candidates by the program itself.

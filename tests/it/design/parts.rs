@@ -58,6 +58,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn parts_together_are_the_whole() {
     parts_are_the_whole(&[3]);
 }

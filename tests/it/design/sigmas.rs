@@ -90,6 +90,7 @@ fn criteria_are_those_of_the_covariance() {
 /// psi has requirements like the coefficients. The search uses the sigma of psi that a comparison states, and
 /// its result is the best of all sequences by separate comparisons.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn requirements_on_psi_count() {
     let mut candidates = Candidates::default();
     for name in ["NUE", "UEN", "DNE", "20,-40,70", "110,15,-35"] {

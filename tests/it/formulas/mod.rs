@@ -526,6 +526,7 @@ fn without_the_engine(times: usize) {
 /// position.
 #[cfg(feature = "symbolica")]
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn formulas_of_the_engine_give_the_truth() {
     with_the_engine(1);
 }

@@ -185,6 +185,7 @@ fn states_in_filter_and_truth(runs: usize) {
 
 /// Monte Carlo runs with biases of the accelerometers that are large against their white noise.
 #[test]
+#[ignore = "seconds: .ci/run"]
 fn monte_carlo_with_biases_of_the_accelerometers() {
     biases_of_the_accelerometers(RUNS[0]);
 }

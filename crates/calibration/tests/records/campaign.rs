@@ -317,7 +317,7 @@ fn records_of_random_platforms() {
 /// 200 records of every case, or those of the environment:
 ///
 /// ```text
-/// CASES="Two inertial" FROM=1000 RECORDS=20 cargo test -p obsdeg-calibration --test it -- \
+/// CASES="Two inertial" FROM=1000 RECORDS=20 cargo test -p obsdeg-calibration --test records -- \
 ///     --ignored --nocapture random_platforms
 /// ```
 #[test]
