@@ -33,6 +33,7 @@ impl SystemModel {
         compiler.check_own_constants()?;
         let segments = compiler.segments(&names, &start_names)?;
         let kept = compiler.nodes(&self.constraints, &names)?;
+        let kept_is_graph = compiler.are_linear(&kept);
         let constraints = compiler.constraints(&names, &starts)?;
         let not_negative = compiler.nodes(&self.not_negative, &names)?;
         let combinations = compiler.nodes(&self.combinations, &names)?;
@@ -44,6 +45,7 @@ impl SystemModel {
             segments,
             constraints,
             kept,
+            kept_is_graph,
             not_negative,
             combinations,
             places: compiler.places,
@@ -286,6 +288,29 @@ impl<'m> Compiler<'m> {
             compiled.carry.push((s, self.node(formula, &carried)?));
         }
         Ok(compiled)
+    }
+
+    /// True if the nodes of all constraints are linear in the algebraic unknowns together, and there are no
+    /// constraints beside their equations.
+    fn are_linear(&self, constraints: &[usize]) -> bool {
+        let own: HashSet<usize> =
+            self.model.algebraic.iter().filter_map(|a| self.slot_of.get(&a.named.name).copied()).collect();
+        // degree in these unknowns, at most 2
+        let mut degrees: Vec<usize> = Vec::new();
+        for op in &self.dag.ops {
+            let of = |i: &usize| degrees.get(*i).copied().unwrap_or(2);
+            degrees.push(match op {
+                Op::Number { .. } | Op::Pi => 0,
+                Op::Slot(slot) => usize::from(own.contains(slot)),
+                Op::Add(a, b) | Op::Subtract(a, b) => of(a).max(of(b)),
+                Op::Multiply(a, b) => (of(a) + of(b)).min(2),
+                Op::Divide(a, b) if of(b) == 0 => of(a),
+                Op::Divide(..) => 2,
+                Op::Primitive { of: argument, .. } if of(argument) == 0 => 0,
+                Op::Primitive { .. } => 2,
+            });
+        }
+        constraints.len() == own.len() && constraints.iter().all(|&node| degrees[node] == 1)
     }
 
     /// Names at the start of a run, with the given starts instead of their states, and the definitions that

@@ -309,6 +309,9 @@ pub struct Compiled {
     pub constraints: Vec<usize>,
     /// Nodes of the constraints in all states, which the motion may keep.
     pub kept: Vec<usize>,
+    /// True if the constraints are those of algebraic equations that are linear in their unknowns: they have
+    /// one solution for all other values.
+    pub kept_is_graph: bool,
     /// Nodes that are not negative where the constraints hold.
     pub not_negative: Vec<usize>,
     /// Nodes of the combinations.
@@ -378,6 +381,7 @@ impl Compiled {
             segments: self.segments.iter().map(segment).collect(),
             constraints: all(&self.constraints),
             kept: all(&self.kept),
+            kept_is_graph: self.kept_is_graph,
             not_negative: all(&self.not_negative),
             combinations: all(&self.combinations),
             places: self.places.iter().map(|(i, place)| (nodes[*i], place.clone())).collect(),

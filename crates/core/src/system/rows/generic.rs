@@ -57,7 +57,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         let lanes = unknowns + states.len();
         for attempt in 0..S::ATTEMPTS {
             let drawn = self.generic_point(point, &states, rng, attempt);
-            let found = self.on_constraints(drawn, lanes, rng, attempt).and_then(|(generic, rows)| {
+            let found = self.on_constraints(point, drawn, lanes, rng, attempt).and_then(|(generic, rows)| {
                 let taylor = self.series(&generic, lanes)?;
                 Ok((taylor, generic, rows))
             });
@@ -83,22 +83,39 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
     }
 
     /// A generic point where the constraints hold, with their differentials, if the motion keeps them: there
-    /// the first order that adds nothing to these is the last. Otherwise the point itself, without any.
+    /// the first order that adds nothing to these is the last. It has to be on the same part of their
+    /// solutions as the start of the run: it is this start if no start is given, or another one where the
+    /// constraints have a single solution. Otherwise the point `drawn` itself, without any.
     fn on_constraints(
         &self,
-        generic: Point<S>,
+        start: &Point<S>,
+        drawn: Point<S>,
         lanes: usize,
         rng: &mut SplitMix64,
         attempt: usize,
     ) -> Result<(Point<S>, Rows<S>), Singular> {
-        let mut held = generic.clone();
-        let rows = match self.hold_kept(&mut held, lanes, rng, attempt) {
-            Err(singular) if singular == Singular::Refused || attempt + 1 < S::ATTEMPTS => {
-                return Err(singular);
+        let mut held = drawn.clone();
+        let rows = if self.compiled.kept.is_empty() {
+            None
+        } else if self.compiled.starts.iter().all(Option::is_none) {
+            for (signal, own) in held.signals.iter_mut().zip(&start.signals) {
+                if matches!(own, Signal::Constant { .. }) {
+                    *signal = own.clone();
+                }
             }
-            found => found.ok().flatten(),
+            for (state, own) in held.initial.iter_mut().zip(&start.initial) {
+                if let (Some(state), Some(own)) = (state, own) {
+                    state.0 = own.0;
+                }
+            }
+            let (rows, kept) = self.constraints(&held, lanes)?;
+            kept.then_some(rows)
+        } else if self.compiled.kept_is_graph {
+            self.hold_kept(&mut held, lanes, rng, attempt)?
+        } else {
+            None
         };
-        Ok(rows.map_or((generic, Vec::new()), |rows| (held, rows)))
+        Ok(rows.map_or((drawn, Vec::new()), |rows| (held, rows)))
     }
 
     /// The point with random values instead of all that are unknown or change, and the states in the slots
