@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use obsdeg_commands::{Analyze, Given, Host, Input, Named, analyze, certificate, reduced_model, title};
+use obsdeg_commands::{Analyze, Given, Host, Input, NamedInput, analyze, certificate, reduced_model, title};
 use obsdeg_report::position_figure;
 
 use crate::arguments::Files;
@@ -108,7 +108,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
 }
 
 /// Verdicts without solutions, one line each; printed while another process uses the symbolic engine.
-fn verdicts(asked: &Analyze, read: &Arc<Vec<Named>>) -> EarlyVerdicts {
+fn verdicts(asked: &Analyze, read: &Arc<Vec<NamedInput>>) -> EarlyVerdicts {
     let asked = Analyze { solutions: false, formulas: false, why: Vec::new(), ..asked.clone() };
     let read = Arc::clone(read);
     Box::new(move || {

@@ -93,7 +93,7 @@
 pub use obsdeg_calibration::record::Record;
 pub use obsdeg_calibration::{
     Calibration, Options as CalibrationOptions, SystemCalibration as ModelCalibration,
-    SystemOptions as ModelCalibrationOptions, calibrate, calibrate_system as calibrate_model,
+    SystemCalibrationOptions as ModelCalibrationOptions, calibrate, calibrate_system as calibrate_model,
 };
 pub use obsdeg_core::analysis::{Analysis, AnalysisOptions, analyze};
 pub use obsdeg_core::model::scheme_file::read as read_scheme;

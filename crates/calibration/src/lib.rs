@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use obsdeg_calibration::record::Record;
-//! use obsdeg_calibration::{SystemOptions, calibrate_system};
+//! use obsdeg_calibration::{SystemCalibrationOptions, calibrate_system};
 //! use obsdeg_core::system::model_file;
 //!
 //! let model = "name = 'decay'\nstates = { x = '-p*x' }\nparameters = ['p']\noutputs = { z = 'x' }\n\
@@ -17,7 +17,7 @@
 //! let rows: String = times.map(|t| format!("{t},{}\n", 2.0 * (-0.5 * t).exp())).collect();
 //! let record = Record::csv("decay.csv", Box::new(std::io::Cursor::new(format!("t,z\n{rows}"))))?;
 //! let model = model_file::read(model)?;
-//! let options = SystemOptions { starts: 4, profiles: vec![], prior: None, seed: 1 };
+//! let options = SystemCalibrationOptions { starts: 4, profiles: vec![], prior: None, seed: 1 };
 //! let found = calibrate_system(&model, record, &options, &|_| true)?;
 //! let p = found.quantities.iter().find(|u| u.name == "p").and_then(|u| u.estimate);
 //! assert!((p.expect("it is determined") - 0.5).abs() < 1e-4);
@@ -58,4 +58,4 @@ pub use answer::{Before, Calibration};
 pub use compared::{CalibrationChange, ChangeTest, CoefficientChange, compared};
 pub use platform::{CalibrationError, Options, calibrate};
 pub use setup::{Basis, Setup};
-pub use system::{SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system};
+pub use system::{SystemCalibration, SystemCalibrationError, SystemCalibrationOptions, calibrate_system};

@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 use crate::arguments::{ANY, InputOptions, SEED, Word, check_whole, one_of, whole};
 use crate::host::{Host, Now};
 use crate::problem::Problem;
-use crate::source::{Input, ModelWithText, Named};
+use crate::source::{Input, ModelWithText, NamedInput};
 
 /// Request of `analyze`: the input, and the options of its verdicts and solutions.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
@@ -259,7 +259,7 @@ impl Answer for Judgements {
 ///
 /// # Errors
 /// Error of the first scheme or model that cannot be judged, with its name if there are several.
-pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result<Judgements, Problem> {
+pub fn analyze(options: &Analyze, read: &[NamedInput], host: &mut Host<'_>) -> Result<Judgements, Problem> {
     if let Some(order) = options.order {
         check_whole("--order", order, &ORDERS)?;
     }
@@ -289,7 +289,7 @@ pub fn analyze(options: &Analyze, read: &[Named], host: &mut Host<'_>) -> Result
 ///
 /// # Errors
 /// [`Problem`] of a scheme or model that certificates do not cover.
-pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
+pub fn certificate(options: &Analyze, read: &[NamedInput]) -> Result<File, Problem> {
     let text = match read {
         [(_, Input::Scheme(scheme))] => certify(scheme, options.seed)?.text(),
         [(_, Input::Model(file))] => {
@@ -310,7 +310,7 @@ pub fn certificate(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
 ///
 /// # Errors
 /// [`Problem`] of a model that has no reduced model, or whose reduced model cannot be written.
-pub fn reduced_model(options: &Analyze, read: &[Named]) -> Result<File, Problem> {
+pub fn reduced_model(options: &Analyze, read: &[NamedInput]) -> Result<File, Problem> {
     let [(_, Input::Model(file))] = read else {
         return Err(Problem::input("a reduced model is of one model"));
     };

@@ -14,7 +14,7 @@ use obsdeg_core::system::WorkLimit;
 use serde::{Deserialize, Serialize};
 
 use crate::problem::Problem;
-use crate::source::{Input, Named, Source};
+use crate::source::{Input, NamedInput, Source};
 use crate::text;
 
 /// Default seed.
@@ -77,7 +77,7 @@ impl Given {
     ///
     /// # Errors
     /// The options, and a file of the other kind.
-    pub fn concern<'a>(&self, read: impl IntoIterator<Item = &'a Named>) -> Result<(), Problem> {
+    pub fn concern<'a>(&self, read: impl IntoIterator<Item = &'a NamedInput>) -> Result<(), Problem> {
         let (mut schemes, mut models) = (None, None);
         for (name, input) in read {
             let of = if matches!(input, Input::Model(_)) { &mut models } else { &mut schemes };
@@ -340,8 +340,8 @@ impl InputOptions {
     ///
     /// # Errors
     /// Defect of an input, with its place.
-    pub fn read(&self, sources: Vec<Source>) -> Result<Vec<Named>, Problem> {
-        let mut read: Vec<Named> = sources.into_iter().map(Source::read).collect::<Result<_, _>>()?;
+    pub fn read(&self, sources: Vec<Source>) -> Result<Vec<NamedInput>, Problem> {
+        let mut read: Vec<NamedInput> = sources.into_iter().map(Source::read).collect::<Result<_, _>>()?;
         if read.is_empty() {
             if self.angles.is_empty() {
                 return Err(Problem::input(

@@ -8,7 +8,7 @@ use obsdeg_calibration::platform::{RecordsRead, STANDARD_GRAVITY, read_records};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::system::SystemFinding;
 use obsdeg_calibration::{
-    Before, Calibration, Going, Options, SystemCalibration, SystemCalibrationError, SystemOptions,
+    Before, Calibration, Going, Options, SystemCalibration, SystemCalibrationError, SystemCalibrationOptions,
     calibrate_system,
 };
 use obsdeg_core::model::Scheme;
@@ -28,7 +28,7 @@ use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
 use crate::conditions::{GyroNoiseOptions, RequirementOptions, within};
 use crate::host::Host;
 use crate::problem::{Kind, Problem};
-use crate::source::{Input, ModelWithText, Named, Source};
+use crate::source::{Input, ModelWithText, NamedInput, Source};
 
 /// Default number of starts.
 const STARTS: u32 = 16;
@@ -278,7 +278,7 @@ impl Calibrated {
 /// Defect of the scheme, the model, a record or the earlier calibration.
 pub fn calibrate(
     a: &Calibrate,
-    named: Named,
+    named: NamedInput,
     records: Vec<Record>,
     before: Option<&Source>,
     host: &Host<'_>,
@@ -330,7 +330,7 @@ fn of_model(
     let Ok([record]) = <[Record; 1]>::try_from(records) else {
         return Err(Problem::input(format!("found {found} records; expected one of a model")));
     };
-    let options = SystemOptions {
+    let options = SystemCalibrationOptions {
         starts: a.starts as usize,
         profiles: a.profile.clone(),
         prior: before.map(|p| prior(p, "obsdeg.system-calibration", "model")).transpose()?,

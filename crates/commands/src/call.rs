@@ -24,7 +24,7 @@ use crate::problem::Problem;
 use crate::procedure::{Procedure, procedure};
 use crate::report::{CalibrationFile, Report, origin, report};
 use crate::simulate::{Simulate, files as simulation_files, simulate};
-use crate::source::{Input, Named, Source, title};
+use crate::source::{Input, NamedInput, Source, title};
 
 /// Names of the commands.
 pub const COMMANDS: [&str; 10] = [
@@ -331,9 +331,9 @@ fn calibrated_from_texts<W: OutputForm>(
     request: Map<String, Value>,
     host: &mut Host<'_>,
 ) -> Result<W::Out, Problem> {
-    let mut asked: CommandRequest<Calibrate, Records> = CommandRequest::read(request)?;
+    let mut asked: CommandRequest<Calibrate, RecordFiles> = CommandRequest::read(request)?;
     asked.options.given = asked.given;
-    let Records { sources, records, before } = asked.files;
+    let RecordFiles { sources, records, before } = asked.files;
     let source = one(sources)?;
     let records = records.into_iter().map(of_text).collect::<Result<_, _>>()?;
     calibrated::<W>(&asked.options, source, records, before.as_ref(), host)
@@ -384,7 +384,7 @@ struct Planning {
 /// Files of a calibration.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
-struct Records {
+struct RecordFiles {
     sources: Vec<Source>,
     records: Vec<Source>,
     before: Option<Source>,
@@ -476,7 +476,7 @@ fn typed<T: DeserializeOwned>(map: Map<String, Value>) -> Result<T, Problem> {
 }
 
 /// Reads schemes and models from texts.
-fn read(sources: Vec<Source>) -> Result<Vec<Named>, Problem> {
+fn read(sources: Vec<Source>) -> Result<Vec<NamedInput>, Problem> {
     if sources.is_empty() {
         return Err(Problem::input("nothing to judge; expected schemes or models as sources"));
     }
@@ -484,7 +484,7 @@ fn read(sources: Vec<Source>) -> Result<Vec<Named>, Problem> {
 }
 
 /// Picture of the positions of every scheme.
-fn position_figures(read: &[Named]) -> Vec<File> {
+fn position_figures(read: &[NamedInput]) -> Vec<File> {
     let mut files = Vec::new();
     for (name, input) in read {
         let Input::Scheme(scheme) = input else { continue };
@@ -503,7 +503,7 @@ fn position_figures(read: &[Named]) -> Vec<File> {
 /// Defect of the request or of a record.
 pub fn call_calibrate(request: &str, records: Vec<Record>, host: &mut Host<'_>) -> Result<Answered, Problem> {
     let answer = || {
-        let mut asked: CommandRequest<Calibrate, Records> = CommandRequest::read(object(request)?)?;
+        let mut asked: CommandRequest<Calibrate, RecordFiles> = CommandRequest::read(object(request)?)?;
         asked.options.given = asked.given;
         let source = one(asked.files.sources)?;
         calibrated::<AllFormats>(&asked.options, source, records, asked.files.before.as_ref(), host)

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::arguments::{ANY, Assumptions, SEED, whole};
 use crate::conditions::{GyroNoiseOptions, MeasurementOptions};
 use crate::problem::Problem;
-use crate::source::{Input, Named, title};
+use crate::source::{Input, NamedInput, title};
 
 /// Request of `compare`: assumptions, conditions and requirements.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
@@ -48,7 +48,7 @@ impl Default for Compare {
 ///
 /// # Errors
 /// Defect of a scheme, with its name; a model among the inputs.
-pub fn compare(options: &Compare, read: Vec<Named>) -> Result<Comparison, Problem> {
+pub fn compare(options: &Compare, read: Vec<NamedInput>) -> Result<Comparison, Problem> {
     let mut entries = Vec::with_capacity(read.len());
     for (name, input) in read {
         let Input::Scheme(mut scheme) = input else {

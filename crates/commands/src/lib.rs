@@ -54,4 +54,4 @@ pub use problem::{Kind, Problem, TextPlace};
 pub use procedure::{Dialect, Planned, Procedure, procedure};
 pub use report::{CalibrationFile, Report, Reviewed, calibration_report, origin, report};
 pub use simulate::{Run, Simulate, files as simulation_files, simulate};
-pub use source::{Expected, Input, ModelWithText, Named, Source, title};
+pub use source::{Expected, Input, ModelWithText, NamedInput, Source, title};

@@ -16,7 +16,7 @@ use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
 use crate::conditions::{ConditionOptions, RUNS};
 use crate::host::{Host, Now};
 use crate::problem::Problem;
-use crate::source::{Input, ModelWithText, Named, Source, title};
+use crate::source::{Input, ModelWithText, NamedInput, Source, title};
 
 /// Request of `report`: assumptions, conditions and number of Monte Carlo runs.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
@@ -105,7 +105,7 @@ pub struct CalibrationFile {
 /// Defect of a scheme, a model or a calibration.
 pub fn report(
     a: &Report,
-    read: Vec<Named>,
+    read: Vec<NamedInput>,
     calibrations: &[CalibrationFile],
     host: &mut Host<'_>,
 ) -> Result<Reviewed, Problem> {

@@ -47,7 +47,7 @@ pub enum Input {
 }
 
 /// Input with its name, which is empty for angles of the command line.
-pub type Named = (String, Input);
+pub type NamedInput = (String, Input);
 
 /// Model with the text that it was read from.
 #[derive(Debug, Clone)]
@@ -82,7 +82,7 @@ impl Source {
     ///
     /// # Errors
     /// Defect of the content, with its place.
-    pub fn read(self) -> Result<Named, Problem> {
+    pub fn read(self) -> Result<NamedInput, Problem> {
         self.refuse_foreign()?;
         let name = self.name.clone();
         let input = match self.must_be {

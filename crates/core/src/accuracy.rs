@@ -196,7 +196,7 @@ fn module(
 }
 
 /// A functional of the unknowns in a ring.
-pub(crate) type Row<R> = Vec<<R as Ring>::Element>;
+pub(crate) type AccuracyRow<R> = Vec<<R as Ring>::Element>;
 
 /// Rows `T^j H F^j S_i Phi_{i-1} ... Phi_1` in a ring, and psi in the carried axes at the end. `power` gives
 /// `T^j`. `phi` gives the three rows of `Phi_i` for `psi^n` as functionals of the local unknowns; all others
@@ -207,7 +207,7 @@ pub(crate) fn dwell_rows<R: LiftField>(
     chain: &[LocalRow],
     power: impl Fn(usize) -> R::Element,
     phi: impl Fn(usize) -> [[R::Element; LOCAL]; 3],
-) -> (Vec<Row<R>>, [Row<R>; 3]) {
+) -> (Vec<AccuracyRow<R>>, [AccuracyRow<R>; 3]) {
     let n = blocks[0].columns.len();
     // psi in the carried axes, as a functional of the unknowns
     let unit = |r: usize| (0..n).map(|c| if c == r { ring.one() } else { ring.zero() }).collect();

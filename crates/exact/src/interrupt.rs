@@ -14,35 +14,29 @@ use std::time::{Duration, Instant};
 /// Source of the decision to continue, for the work of one thread.
 enum Cancellation {
     /// Callback of this thread, called when the interval has passed.
-    Callback { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant, clock: Clock },
+    Callback { goes_on: Box<dyn FnMut() -> bool>, interval: Duration, last: Instant, clock: CheckClock },
     /// Flag that another thread sets.
     Flag(Arc<AtomicBool>),
 }
 
-/// Clock that is read at every check, or at one of [`SKIPPED`] where checks follow each other closely: their
-/// number may be thousands in a millisecond.
-struct Clock {
+/// Clock that is read at every check, or at one of sixteen where checks follow each other closely: there may
+/// be thousands in a millisecond.
+struct CheckClock {
     read: Instant,
-    /// Time of [`SKIPPED`] checks that follow each other closely.
+    /// Time of sixteen checks that follow each other closely.
     close: Duration,
-    /// Number of checks until the next reading.
-    left: u32,
 }
 
 /// Largest number of checks without a reading of the clock.
 const SKIPPED: u32 = 15;
 
-impl Clock {
-    /// Time now, if it is read at this check.
-    fn now(&mut self) -> Option<Instant> {
-        if self.left > 0 {
-            self.left -= 1;
-            return None;
-        }
+impl CheckClock {
+    /// Time now; the next checks are skipped if this one follows those before closely.
+    fn now(&mut self) -> Instant {
         let now = Instant::now();
-        self.left = if now - self.read < self.close { SKIPPED } else { 0 };
+        SKIP.set(if now - self.read < self.close { SKIPPED } else { 0 });
         self.read = now;
-        Some(now)
+        now
     }
 }
 
@@ -51,6 +45,8 @@ struct Interrupted;
 
 thread_local! {
     static CANCELLATION: Cell<Option<Cancellation>> = const { Cell::new(None) };
+    /// Number of checks that do nothing.
+    static SKIP: Cell<u32> = const { Cell::new(0) };
 }
 
 /// Runs `work` and calls `goes_on` on this thread whenever `interval` has passed, at the next
@@ -61,7 +57,7 @@ pub fn hearing<T>(
     work: impl FnOnce() -> T,
 ) -> Option<T> {
     let last = Instant::now();
-    let clock = Clock { read: last, close: interval / 100, left: 0 };
+    let clock = CheckClock { read: last, close: interval / 100 };
     run(Cancellation::Callback { goes_on: Box::new(goes_on), interval, last, clock }, work)
 }
 
@@ -73,8 +69,10 @@ pub fn while_wanted<T>(wanted: Arc<AtomicBool>, work: impl FnOnce() -> T) -> Opt
 
 fn run<T>(own: Cancellation, work: impl FnOnce() -> T) -> Option<T> {
     let before = CANCELLATION.replace(Some(own));
+    SKIP.set(0);
     let done = catch_unwind(AssertUnwindSafe(work));
     CANCELLATION.set(before);
+    SKIP.set(0);
     match done {
         Ok(done) => Some(done),
         Err(reason) if reason.is::<Interrupted>() => None,
@@ -84,18 +82,23 @@ fn run<T>(own: Cancellation, work: impl FnOnce() -> T) -> Option<T> {
 
 /// Called by long loops, at least every tenth of a second. Does not return if the work must end.
 pub fn check() {
+    let skip = SKIP.get();
+    if skip > 0 {
+        SKIP.set(skip - 1);
+        return;
+    }
     // the callback may run other work on this thread
     let Some(mut hearing) = CANCELLATION.take() else { return };
     let goes_on = match &mut hearing {
         Cancellation::Flag(wanted) => wanted.load(Ordering::Relaxed),
-        Cancellation::Callback { goes_on, interval, last, clock } => match clock.now() {
-            Some(now) if now - *last >= *interval => {
-                let goes_on = goes_on();
+        Cancellation::Callback { goes_on, interval, last, clock } => {
+            let due = clock.now() - *last >= *interval;
+            let goes_on = !due || goes_on();
+            if due {
                 *last = Instant::now();
-                goes_on
             }
-            _ => true,
-        },
+            goes_on
+        }
     };
     CANCELLATION.set(Some(hearing));
     if !goes_on {
@@ -164,11 +167,21 @@ mod tests {
     /// Where checks follow each other closely, one of sixteen reads the clock; where they do not, each does.
     #[test]
     fn the_clock_is_read_as_often_as_needed() {
-        let mut clock = Clock { read: Instant::now(), close: Duration::from_secs(60), left: 0 };
-        let readings = |clock: &mut Clock| (0..160).filter(|_| clock.now().is_some()).count();
-        assert_eq!(readings(&mut clock), 10);
-        clock.close = Duration::ZERO;
-        assert_eq!(readings(&mut clock), 160);
+        for (interval, least, most) in [(6000, 10, 10), (0, 160, 160)] {
+            let (asked, last) = (Rc::new(Cell::new(0)), Instant::now());
+            let clock = CheckClock { read: last, close: Duration::from_secs(interval) / 100 };
+            let count = asked.clone();
+            let goes_on = move || {
+                count.set(count.get() + 1);
+                true
+            };
+            // every reading of the clock asks
+            let own =
+                Cancellation::Callback { goes_on: Box::new(goes_on), interval: Duration::ZERO, last, clock };
+            assert_eq!(run(own, || (0..160).for_each(|_| check())), Some(()));
+            assert!((least..=most).contains(&asked.get()), "{interval}: {}", asked.get());
+        }
+        assert_eq!(SKIP.get(), 0);
     }
 
     #[test]

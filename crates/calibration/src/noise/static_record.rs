@@ -27,7 +27,7 @@ const FAR: f64 = 8.0;
 const OFTEN: usize = 10_000;
 
 /// Index, kind and scale of a column of a sensor, with its title.
-type Column<'a> = (&'a (usize, SensorKind, f64), String);
+type SensorColumn<'a> = (&'a (usize, SensorKind, f64), String);
 
 /// Column of a sensor.
 pub(super) struct Channel {
@@ -132,7 +132,7 @@ impl StaticRecord {
             times.windows(2).enumerate().filter(|(_, w)| !is_usual(w)).map(|(i, _)| i + 1).collect();
         let intervals = times.windows(2).filter(|w| is_usual(w));
         let jitter = intervals.map(|w| ((w[1] - w[0]) / interval_s - 1.0).abs()).fold(0.0, f64::max);
-        let channel = |(((_, sensor, scale), text), values): (Column<'_>, Vec<f64>)| {
+        let channel = |(((_, sensor, scale), text), values): (SensorColumn<'_>, Vec<f64>)| {
             let empty = values.iter().filter(|x| x.is_nan()).count();
             let (sensor, scale) = (*sensor, *scale);
             let (stretches, left_out) = stretches(values, &begins, &lines);

@@ -20,7 +20,7 @@ const SIGMAS: f64 = 6.0;
 /// Measurement: channel and position, time in s, normalised residual.
 type Normalised = ((usize, usize), f64, f64);
 /// Channel and position, and the residuals of two records there.
-type Pair = ((usize, usize), f64, f64);
+type CopyPair = ((usize, usize), f64, f64);
 
 impl AnswerData<'_> {
     /// Measurements of run `r`, by channel, position and time.
@@ -67,12 +67,12 @@ impl AnswerData<'_> {
 }
 
 /// Second difference of a residual over three neighbours.
-fn bend(w: &[Pair], of: fn(&Pair) -> f64) -> f64 {
+fn bend(w: &[CopyPair], of: fn(&CopyPair) -> f64) -> f64 {
     of(&w[0]) - 2.0 * of(&w[1]) + of(&w[2])
 }
 
 /// Residuals of two records at the same times, to `within` s: channel and position, and both residuals.
-fn together(own: &[Normalised], others: &[Normalised], within: f64) -> Vec<Pair> {
+fn together(own: &[Normalised], others: &[Normalised], within: f64) -> Vec<CopyPair> {
     let mut rest = others.iter().peekable();
     let of = |&(place, t, x): &Normalised| {
         while rest.next_if(|o| o.0 < place || o.0 == place && o.1 < t - within).is_some() {}

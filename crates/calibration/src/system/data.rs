@@ -63,7 +63,7 @@ enum InputSource {
 type OutputSource = Result<(usize, Option<usize>), f64>;
 
 /// Meaning of the requested numbers of a row.
-struct Columns {
+struct ModelColumns {
     wanted: Vec<Wanted>,
     /// Known inputs with values in every row, and their sources.
     inputs: Vec<(usize, InputSource)>,
@@ -75,7 +75,7 @@ struct Columns {
     ignored: Vec<String>,
 }
 
-impl Columns {
+impl ModelColumns {
     fn of(record: &Record, model: &SystemModel) -> Result<Self, SystemCalibrationError> {
         let time = record.find("t").ok_or_else(|| record.missing("`t` (the time of the model)"))?;
         let mut wanted = vec![units::time(record, time, model)?];
@@ -195,7 +195,7 @@ struct RowReader<'a> {
     /// Name of the record, and the texts of the requested columns.
     record: &'a str,
     texts: Vec<String>,
-    columns: &'a Columns,
+    columns: &'a ModelColumns,
     /// Numbers of experiments and of segments.
     experiments: usize,
     segments: usize,
@@ -318,7 +318,7 @@ pub(super) fn read(
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<Read, SystemCalibrationError> {
     let record = record.named(&model.recording)?;
-    let columns = Columns::of(&record, model)?;
+    let columns = ModelColumns::of(&record, model)?;
     let still = model.recording.still.as_ref();
     let (name, experiments) = (record.name().to_string(), model.experiments.max(1));
     let least = earliest(model);

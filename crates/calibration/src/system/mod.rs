@@ -51,7 +51,7 @@ const ROUNDS: usize = 30;
 
 /// Options of a system calibration.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SystemOptions {
+pub struct SystemCalibrationOptions {
     /// Number of starts.
     pub starts: usize,
     /// Names of the unknowns with a requested profile.
@@ -69,7 +69,7 @@ pub struct SystemOptions {
 pub fn calibrate_system(
     model: &SystemModel,
     record: Record,
-    options: &SystemOptions,
+    options: &SystemCalibrationOptions,
     going: &dyn Fn(Going<'_>) -> bool,
 ) -> Result<SystemCalibration, SystemCalibrationError> {
     let compiled = model.compile()?;
@@ -175,7 +175,7 @@ struct Calibrating<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
     data: &'a Read,
-    options: &'a SystemOptions,
+    options: &'a SystemCalibrationOptions,
     problem: SystemProblem<'a>,
     /// All filter states at the first start.
     base: DVector<f64>,
@@ -189,7 +189,7 @@ impl<'a> Calibrating<'a> {
         compiled: &'a Compiled,
         numeric: Numeric<'a>,
         data: &'a Read,
-        options: &'a SystemOptions,
+        options: &'a SystemCalibrationOptions,
         going: &'a dyn Fn(Going<'_>) -> bool,
     ) -> Result<Self, SystemCalibrationError> {
         let known = |state: &FilterState| match *state {

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::system::SystemEstimated;
-use obsdeg_calibration::{Before, SystemOptions};
+use obsdeg_calibration::{Before, SystemCalibrationOptions};
 
 use crate::models::{calibrated, found, normals, options};
 
@@ -126,7 +126,7 @@ fn a_sum_that_is_known() {
     assert_eq!((c.consistent, c.degrees_of_freedom), (Some(true), 23));
     // fully known: nothing is estimated, and nothing moves
     let both = model("\"a + b = 0.000003\", \"a = 2*b\"");
-    let c = calibrated(&both, &text, &SystemOptions { profiles: vec!["a".into()], ..options() })
+    let c = calibrated(&both, &text, &SystemCalibrationOptions { profiles: vec!["a".into()], ..options() })
         .expect("calibrated");
     let (x, s, _) = of(&c.quantities, "a");
     assert!((x / 2e-6 - 1.0).abs() < 1e-9 && s == 0.0, "{x} {s}");
@@ -222,7 +222,7 @@ fn profiles_and_other_solutions_keep_to_constraints() {
     }
     let model = "constraints = [\"c^2 + s^2 = 1\"]\n[known_inputs]\nu = \"generic\"\n[parameters]\nc = {}\n\
         s = {}\n[outputs]\ny = \"s*u\"\n[simulation]\nvalues = { c = 0.9, s = 0.3 }\nnoise = { y = 0.2 }\n";
-    let asked = SystemOptions { profiles: vec!["c".into()], ..options() };
+    let asked = SystemCalibrationOptions { profiles: vec!["c".into()], ..options() };
     let c = calibrated(model, &text, &asked).expect("calibrated");
     let chi = |s: f64| (squares - 2.0 * s * sum[1] + s * s * sum[0]) / 0.04;
     let s = sum[1] / sum[0];
@@ -254,7 +254,7 @@ fn what_was_known_before_keeps_to_constraints() {
         rests_on: c.rests_on.clone(),
         of: c.model.clone(),
     };
-    let known = SystemOptions { prior: Some(before), ..options() };
+    let known = SystemCalibrationOptions { prior: Some(before), ..options() };
     let both = calibrated(&model, &second, &known).expect("calibrated");
     let all = calibrated(&model, &turned(0..40), &options()).expect("calibrated");
     assert_eq!((both.degrees_of_freedom, both.consistent), (73 - 3 + 1, Some(true)));
@@ -292,7 +292,7 @@ fn what_was_known_of_some_is_as_it_was() {
     let p = DMatrix::from_fn(2, 2, |i, j| estimates.covariance[i][j]);
     let mean = DVector::from_column_slice(&estimates.estimates);
     let before = Before { priors: Vec::new(), estimates, rests_on: c.rests_on.clone(), of: c.model };
-    let known = SystemOptions { prior: Some(before), ..options() };
+    let known = SystemCalibrationOptions { prior: Some(before), ..options() };
     let c = calibrated(model, &text, &known).expect("calibrated");
     // normal equations for a and b alone
     let ones = DMatrix::from_element(10, 2, -1.0);

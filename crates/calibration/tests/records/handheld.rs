@@ -1,7 +1,7 @@
 //! Record of a handheld unit, written from its equations: its errors are found, with the right sigmas.
 
 use obsdeg_calibration::record::Record;
-use obsdeg_calibration::{Before, SystemCalibration, SystemOptions, calibrate_system};
+use obsdeg_calibration::{Before, SystemCalibration, SystemCalibrationOptions, calibrate_system};
 use obsdeg_core::system::model_file;
 use obsdeg_exact::SplitMix64;
 
@@ -104,7 +104,7 @@ fn record(rests: usize, seed: u64) -> String {
     text
 }
 
-fn calibrated(file: &str, text: &str, options: &SystemOptions) -> SystemCalibration {
+fn calibrated(file: &str, text: &str, options: &SystemCalibrationOptions) -> SystemCalibration {
     let path = format!("{}/../../examples/handheld/{file}", env!("CARGO_MANIFEST_DIR"));
     let model = std::fs::read_to_string(path).expect("the model");
     // turns of 1.5 s; no earth rate
@@ -120,7 +120,7 @@ fn calibrated(file: &str, text: &str, options: &SystemOptions) -> SystemCalibrat
 #[test]
 fn errors_of_a_unit_in_the_hand() {
     let text = record(16, 7);
-    let options = SystemOptions { starts: 1, profiles: vec![], prior: None, seed: 1 };
+    let options = SystemCalibrationOptions { starts: 1, profiles: vec![], prior: None, seed: 1 };
     let first = calibrated("accelerometers.toml", &text, &options);
     assert_eq!(
         (first.intervals, first.rows, first.consistent),
@@ -130,7 +130,7 @@ fn errors_of_a_unit_in_the_hand() {
     );
     let (estimates, rests_on) = (first.covariance.clone(), first.rests_on.clone());
     let prior = Some(Before { priors: Vec::new(), estimates, rests_on, of: first.model.clone() });
-    let second = calibrated("gyros.toml", &text, &SystemOptions { prior, ..options });
+    let second = calibrated("gyros.toml", &text, &SystemCalibrationOptions { prior, ..options });
     assert_eq!(second.consistent, Some(true), "{:?}", second.findings);
     for c in [&first, &second] {
         for u in &c.quantities {

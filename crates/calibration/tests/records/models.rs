@@ -5,19 +5,19 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::system::{StatesStart, SystemEstimated, SystemFinding};
 use obsdeg_calibration::{
-    Before, SystemCalibration, SystemCalibrationError, SystemOptions, calibrate_system,
+    Before, SystemCalibration, SystemCalibrationError, SystemCalibrationOptions, calibrate_system,
 };
 use obsdeg_core::system::model_file;
 use obsdeg_exact::SplitMix64;
 
-pub(crate) fn options() -> SystemOptions {
-    SystemOptions { starts: 16, profiles: vec![], prior: None, seed: 1 }
+pub(crate) fn options() -> SystemCalibrationOptions {
+    SystemCalibrationOptions { starts: 16, profiles: vec![], prior: None, seed: 1 }
 }
 
 pub(crate) fn calibrated(
     model: &str,
     text: &str,
-    options: &SystemOptions,
+    options: &SystemCalibrationOptions,
 ) -> Result<SystemCalibration, SystemCalibrationError> {
     let record = Record::csv("data.csv", Box::new(std::io::Cursor::new(text.to_string())))?;
     let model = format!("name = \"small\"\n{model}");
@@ -155,7 +155,7 @@ fn units_of_models() {
         rests_on: right.rests_on.clone(),
         of: right.model.clone(),
     };
-    let options = SystemOptions { prior: Some(before), ..options() };
+    let options = SystemCalibrationOptions { prior: Some(before), ..options() };
     let e = calibrated(model, &text("", 1.0, "", 1.0), &options).expect_err("known").to_string();
     assert!(e.contains("which the calibration before rests on, of the same model"), "{e}");
     // a calibration of another model counts, with a finding

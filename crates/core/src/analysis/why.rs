@@ -82,7 +82,7 @@ struct VerdictExplainer<'a> {
 }
 
 /// Row of derivatives in the first field.
-type Row = Vec<u64>;
+type DerivativeRow = Vec<u64>;
 
 impl VerdictExplainer<'_> {
     fn scheme(&self) -> &Scheme {
@@ -94,7 +94,7 @@ impl VerdictExplainer<'_> {
     }
 
     /// Derivatives of Z, and their rows in the first field, that together determine the unknown.
-    fn determined_by(&mut self) -> (Vec<OutputDerivative>, Vec<Row>) {
+    fn determined_by(&mut self) -> (Vec<OutputDerivative>, Vec<DerivativeRow>) {
         let Some(degree) = self.degree else { return Default::default() };
         let unknowns = self.platform.names().len();
         if self.scheme().rotates() {
@@ -110,7 +110,7 @@ impl VerdictExplainer<'_> {
         let [(derivatives, first), (_, second)] = [0, 1].map(|i| {
             let sample = self.judged.verdicts.values[i].sample(self.scheme(), 1);
             let mut source = PlatformRows::new(self.platform, &sample);
-            let (mut named, mut rows): (Vec<OutputDerivative>, Vec<Row>) = Default::default();
+            let (mut named, mut rows): (Vec<OutputDerivative>, Vec<DerivativeRow>) = Default::default();
             for order in 0..=degree {
                 named.extend(source.labels(order).into_iter().map(|(station, component)| OutputDerivative {
                     output: if component == AZIMUTH { "Za".into() } else { format!("Z{component}") },
@@ -140,7 +140,11 @@ impl VerdictExplainer<'_> {
     }
 
     /// Direction along which no derivative changes: below the degree of the unknown, or at every order.
-    fn unseen(&mut self, derivatives: &[OutputDerivative], rows: &[Row]) -> Option<UnseenDirection> {
+    fn unseen(
+        &mut self,
+        derivatives: &[OutputDerivative],
+        rows: &[DerivativeRow],
+    ) -> Option<UnseenDirection> {
         let order = match self.degree {
             Some(degree) => degree.checked_sub(1)?,
             None => self.stairs[0].len().saturating_sub(1),
@@ -166,7 +170,8 @@ impl VerdictExplainer<'_> {
         }
         let vector = vector_on(&first, &support);
         let field = first.field();
-        let sees = |row: &Row| field.dot(0, support.iter().zip(&vector).map(|(&c, &x)| (row[c], x))) != 0;
+        let sees =
+            |row: &DerivativeRow| field.dot(0, support.iter().zip(&vector).map(|(&c, &x)| (row[c], x))) != 0;
         let seen = derivatives.iter().zip(rows).filter(|(d, row)| Some(d.order) == self.degree && sees(row));
         let seen_by = seen.map(|(d, _)| d.clone()).collect();
         Some(UnseenDirection {

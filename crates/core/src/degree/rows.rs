@@ -3,7 +3,7 @@
 use obsdeg_exact::Scalars;
 
 /// An element of a field.
-type Element<F> = <F as Scalars>::Element;
+type RowElement<F> = <F as Scalars>::Element;
 
 /// Source of derivative rows: the differentials of `Z_i^(k)` with respect to the unknowns, at one point of
 /// one field.
@@ -21,5 +21,5 @@ pub trait DerivativeRows {
     /// false if no segment has rows of this or a higher order that could add anything: the chain of each
     /// segment has ended.
     #[expect(clippy::type_complexity, reason = "a function of a row, which would be no plainer under a name")]
-    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[Element<Self::Field>]) -> bool) -> bool;
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[RowElement<Self::Field>]) -> bool) -> bool;
 }

@@ -185,9 +185,9 @@ fn wrong_kind(message: &str) -> Option<String> {
     };
     let expected = match expected {
         "f64" | "f32" => "a number".into(),
-        "usize" | "u64" | "u32" => "a whole number, not negative".into(),
-        "i64" => "a whole number".into(),
-        "a string" => "a text in quotes".into(),
+        "usize" | "u64" | "u32" | "u16" | "u8" => "a whole number, not negative".into(),
+        "i64" | "i32" | "i16" => "a whole number".into(),
+        "a string" | "string or map" => "a text in quotes".into(),
         "a boolean" => "true or false".into(),
         "a sequence" => "a list in [ ]".into(),
         "a map" => "a table".into(),

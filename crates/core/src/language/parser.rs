@@ -28,7 +28,7 @@ struct ParserState<'a> {
     vectors: bool,
 }
 
-type Input<'a> = Stateful<LocatingSlice<&'a str>, ParserState<'a>>;
+type ParserInput<'a> = Stateful<LocatingSlice<&'a str>, ParserState<'a>>;
 
 /// Error of the parser: place and expected text, or shapes that do not fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,9 +38,9 @@ struct ParseFailure {
     shape: Option<Box<ExpressionError>>,
 }
 
-impl ParserError<Input<'_>> for ParseFailure {
+impl ParserError<ParserInput<'_>> for ParseFailure {
     type Inner = Self;
-    fn from_input(input: &Input<'_>) -> Self {
+    fn from_input(input: &ParserInput<'_>) -> Self {
         Self { at: input.current_token_start(), expected: "something else", shape: None }
     }
     fn into_inner(self) -> Result<Self, Self> {
@@ -50,28 +50,28 @@ impl ParserError<Input<'_>> for ParseFailure {
 
 type Parsed<T> = Result<T, ErrMode<ParseFailure>>;
 
-fn wrong<T>(input: &Input<'_>, expected: &'static str) -> Parsed<T> {
+fn wrong<T>(input: &ParserInput<'_>, expected: &'static str) -> Parsed<T> {
     Err(ErrMode::Cut(ParseFailure { at: input.current_token_start(), expected, shape: None }))
 }
 
 /// Failure from which the parser may try another rule.
-fn other<T>(input: &Input<'_>) -> Parsed<T> {
+fn other<T>(input: &ParserInput<'_>) -> Parsed<T> {
     Err(ErrMode::Backtrack(ParseFailure::from_input(input)))
 }
 
-fn skip_blanks(input: &mut Input<'_>) {
+fn skip_blanks(input: &mut ParserInput<'_>) {
     let rest: &str = input.input.as_ref();
     let blanks = rest.len() - rest.trim_start().len();
     input.next_slice(blanks);
 }
 
-fn peek(input: &Input<'_>) -> Option<char> {
+fn peek(input: &ParserInput<'_>) -> Option<char> {
     let rest: &str = input.input.as_ref();
     rest.chars().next()
 }
 
 /// Next character, if it is one of `wanted`.
-fn symbol(input: &mut Input<'_>, wanted: &str) -> Option<char> {
+fn symbol(input: &mut ParserInput<'_>, wanted: &str) -> Option<char> {
     skip_blanks(input);
     let found = peek(input).filter(|c| wanted.contains(*c))?;
     input.next_slice(found.len_utf8());
@@ -79,7 +79,7 @@ fn symbol(input: &mut Input<'_>, wanted: &str) -> Option<char> {
 }
 
 /// Operator between two operands; `**` is read as `^`.
-fn operator(input: &mut Input<'_>) -> Option<char> {
+fn operator(input: &mut ParserInput<'_>) -> Option<char> {
     let found = symbol(input, "+-*/^")?;
     if found == '*' && peek(input) == Some('*') {
         input.next_slice(1);
@@ -89,7 +89,7 @@ fn operator(input: &mut Input<'_>) -> Option<char> {
 }
 
 /// Adds an operation on scalars that ends at the current place.
-fn push(input: &mut Input<'_>, node: Node, start: usize) -> Value {
+fn push(input: &mut ParserInput<'_>, node: Node, start: usize) -> Value {
     let end = input.previous_token_end();
     let expression = &mut input.state.expression;
     expression.nodes.push(node);
@@ -99,7 +99,7 @@ fn push(input: &mut Input<'_>, node: Node, start: usize) -> Value {
 
 /// Adds an operation that ends at the current place and makes or takes vectors.
 fn push_vector(
-    input: &mut Input<'_>,
+    input: &mut ParserInput<'_>,
     start: usize,
     made: impl FnOnce(&mut NodeBuilder<'_>) -> Made,
 ) -> Parsed<Value> {
@@ -115,7 +115,7 @@ fn push_vector(
     }
 }
 
-fn number(input: &mut Input<'_>) -> Parsed<Value> {
+fn number(input: &mut ParserInput<'_>) -> Parsed<Value> {
     let start = input.current_token_start();
     let rest: &str = input.input.as_ref();
     let mut length = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
@@ -157,7 +157,7 @@ const fn functions(names: Names) -> &'static str {
     }
 }
 
-fn operand(input: &mut Input<'_>) -> Parsed<Value> {
+fn operand(input: &mut ParserInput<'_>) -> Parsed<Value> {
     skip_blanks(input);
     let start = input.current_token_start();
     let plain = input.state.names == Names::Plain;
@@ -216,7 +216,7 @@ fn operand(input: &mut Input<'_>) -> Parsed<Value> {
 }
 
 /// Values between commas, until `end`.
-fn values(input: &mut Input<'_>, end: &str, expected: &'static str) -> Parsed<Vec<Value>> {
+fn values(input: &mut ParserInput<'_>, end: &str, expected: &'static str) -> Parsed<Vec<Value>> {
     let mut out = Vec::new();
     loop {
         out.push(sum(input)?);
@@ -227,7 +227,7 @@ fn values(input: &mut Input<'_>, end: &str, expected: &'static str) -> Parsed<Ve
 }
 
 /// A name, or a function with its arguments.
-fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
+fn name(input: &mut ParserInput<'_>, start: usize) -> Parsed<Value> {
     let names = input.state.names;
     let rest: &str = input.input.as_ref();
     let more = |c: char| c.is_alphanumeric() || c == '_' || (c == '@' && names == Names::Platform);
@@ -278,7 +278,7 @@ fn name(input: &mut Input<'_>, start: usize) -> Parsed<Value> {
 
 /// Angle `atan2(y, x)` of the point (x, y): `2 atan(y / (sqrt(x^2 + y^2) + x))`, valid off the negative
 /// x-axis, where it jumps.
-fn angle(input: &mut Input<'_>, arguments: &[Value], start: usize) -> Parsed<Value> {
+fn angle(input: &mut ParserInput<'_>, arguments: &[Value], start: usize) -> Parsed<Value> {
     let [Value { shape: Shape::SCALAR, entries: y, .. }, Value { shape: Shape::SCALAR, entries: x, .. }] =
         arguments
     else {
@@ -286,7 +286,7 @@ fn angle(input: &mut Input<'_>, arguments: &[Value], start: usize) -> Parsed<Val
         return push_vector(input, start, |_| Err(Mismatch::new("two scalars in `atan2`", found)));
     };
     let (y, x) = (y[0], x[0]);
-    let call = |input: &mut Input<'_>, node: Node| push(input, node, start).entries[0];
+    let call = |input: &mut ParserInput<'_>, node: Node| push(input, node, start).entries[0];
     let (xx, yy) = (call(input, Node::Multiply(x, x)), call(input, Node::Multiply(y, y)));
     let square = call(input, Node::Add(xx, yy));
     let radius = call(input, Node::Call { function: Function::Sqrt, argument: square });
@@ -296,7 +296,7 @@ fn angle(input: &mut Input<'_>, arguments: &[Value], start: usize) -> Parsed<Val
     Ok(push(input, Node::Add(half, half), start))
 }
 
-fn binary(input: &mut Input<'_>, sign: char, a: &Value, b: &Value) -> Parsed<Value> {
+fn binary(input: &mut ParserInput<'_>, sign: char, a: &Value, b: &Value) -> Parsed<Value> {
     let node = match (sign, a.shape, b.shape) {
         (_, Shape::SCALAR, Shape::SCALAR) => {
             let (a, b) = (a.entries[0], b.entries[0]);
@@ -313,22 +313,22 @@ fn binary(input: &mut Input<'_>, sign: char, a: &Value, b: &Value) -> Parsed<Val
     Ok(push(input, node, a.start))
 }
 
-fn sum(input: &mut Input<'_>) -> Parsed<Value> {
+fn sum(input: &mut ParserInput<'_>) -> Parsed<Value> {
     expression(operand)
-        .prefix(|input: &mut Input<'_>| match symbol(input, "-+") {
-            Some('-') => Ok(Prefix(5, |input: &mut Input<'_>, a: Value| match a.shape {
+        .prefix(|input: &mut ParserInput<'_>| match symbol(input, "-+") {
+            Some('-') => Ok(Prefix(5, |input: &mut ParserInput<'_>, a: Value| match a.shape {
                 Shape::SCALAR => Ok(push(input, Node::Negate(a.entries[0]), a.start)),
                 shape => push_vector(input, a.start, |make| Ok((shape, make.negative(&a)))),
             })),
-            Some(_) => Ok(Prefix(5, |_: &mut Input<'_>, a: Value| Ok(a))),
+            Some(_) => Ok(Prefix(5, |_: &mut ParserInput<'_>, a: Value| Ok(a))),
             None => wrong(input, "a number, a name or `(`"),
         })
-        .infix(|input: &mut Input<'_>| match operator(input) {
-            Some('+') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| binary(i, '+', &a, &b))),
-            Some('-') => Ok(Infix::Left(1, |i: &mut Input<'_>, a, b| binary(i, '-', &a, &b))),
-            Some('*') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| binary(i, '*', &a, &b))),
-            Some('/') => Ok(Infix::Left(3, |i: &mut Input<'_>, a, b| binary(i, '/', &a, &b))),
-            Some(_) => Ok(Infix::Right(8, |i: &mut Input<'_>, a, b| binary(i, '^', &a, &b))),
+        .infix(|input: &mut ParserInput<'_>| match operator(input) {
+            Some('+') => Ok(Infix::Left(1, |i: &mut ParserInput<'_>, a, b| binary(i, '+', &a, &b))),
+            Some('-') => Ok(Infix::Left(1, |i: &mut ParserInput<'_>, a, b| binary(i, '-', &a, &b))),
+            Some('*') => Ok(Infix::Left(3, |i: &mut ParserInput<'_>, a, b| binary(i, '*', &a, &b))),
+            Some('/') => Ok(Infix::Left(3, |i: &mut ParserInput<'_>, a, b| binary(i, '/', &a, &b))),
+            Some(_) => Ok(Infix::Right(8, |i: &mut ParserInput<'_>, a, b| binary(i, '^', &a, &b))),
             None => other(input),
         })
         .parse_next(input)
@@ -482,7 +482,7 @@ fn read<'a>(
     text: &'a str,
     names: Names,
     shapes: &'a Shapes,
-    rule: impl FnOnce(&mut Input<'a>) -> Parsed<Value>,
+    rule: impl FnOnce(&mut ParserInput<'a>) -> Parsed<Value>,
 ) -> Result<(ParserState<'a>, Value), ExpressionError> {
     if let Some(at) = too_deep(text) {
         return Err(ExpressionError::TooDeep { span: at..at + 1 });

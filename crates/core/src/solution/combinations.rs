@@ -14,7 +14,7 @@ use crate::solution::support::short_support;
 
 /// Named observable combination.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Combination {
+pub(crate) struct NamedCombination {
     /// Name, such as `D_FZ - wN*psi_y` or `eps_x^n@p2`.
     pub name: String,
     /// Coefficients in the first field of the verdicts, up to a factor.
@@ -73,7 +73,7 @@ pub(crate) fn combinations(
     platform: &Platform,
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
-) -> Vec<Combination> {
+) -> Vec<NamedCombination> {
     let sum = |(vector, degree): (Vec<u64>, usize)| {
         let mut support = support(&vector);
         let lead = lead(platform, &support);
@@ -82,9 +82,9 @@ pub(crate) fn combinations(
         let found = functional.and_then(|f| Some((readable_sum(platform, &f.terms)?, f)));
         solver.left_out += usize::from(found.is_none());
         let (name, functional) = found?;
-        Some(Combination { name, vector, functional: Some(functional), degree })
+        Some(NamedCombination { name, vector, functional: Some(functional), degree })
     };
-    let mut out: Vec<Combination> = short_vectors(verdicts).into_iter().filter_map(sum).collect();
+    let mut out: Vec<NamedCombination> = short_vectors(verdicts).into_iter().filter_map(sum).collect();
     // other combinations that are determined during a turn contain turning rates, and have no name
     if !platform.scheme().by_course() {
         complete_by_positions(platform, verdicts, solver, &mut out);
@@ -134,7 +134,7 @@ fn complete_by_positions(
     platform: &Platform,
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
-    out: &mut Vec<Combination>,
+    out: &mut Vec<NamedCombination>,
 ) {
     let labels = stations(platform.scheme());
     for (k, basis) in verdicts.stairs.iter().enumerate() {
@@ -150,7 +150,7 @@ fn complete_by_positions(
             if span.insert(&vector) {
                 let functional = solver.functional_of_row(row);
                 let name = local_name(solver, &labels, row);
-                out.push(Combination { name, vector, functional, degree: k });
+                out.push(NamedCombination { name, vector, functional, degree: k });
             }
         }
     }

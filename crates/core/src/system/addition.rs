@@ -18,11 +18,11 @@ const TERMS: usize = 24;
 const POWER: i64 = 12;
 
 /// A rational number in lowest terms.
-type Ratio = (i64, i64);
+type IntegerRatio = (i64, i64);
 /// Factors (nodes) and their powers.
-type Monomial = Vec<(usize, u32)>;
+type SlotPowers = Vec<(usize, u32)>;
 /// A polynomial with rational coefficients; no coefficient is zero.
-type Polynomial = BTreeMap<Monomial, Ratio>;
+type SlotPolynomial = BTreeMap<SlotPowers, IntegerRatio>;
 
 /// An argument as a combination of kept arguments.
 #[derive(Debug, Clone)]
@@ -86,10 +86,10 @@ fn is_function_of_sums(function: Function) -> bool {
 fn family(dag: &Dag, real: bool) -> ArgumentFamily {
     let mut out = ArgumentFamily::default();
     // kept arguments, reduced: leading monomial, polynomial, and its combination of the kept arguments
-    let mut reduced: Vec<(Monomial, Polynomial, Vec<Ratio>)> = Vec::new();
-    let mut found: Vec<(usize, i64, Vec<Ratio>)> = Vec::new();
+    let mut reduced: Vec<(SlotPowers, SlotPolynomial, Vec<IntegerRatio>)> = Vec::new();
+    let mut found: Vec<(usize, i64, Vec<IntegerRatio>)> = Vec::new();
     let mut polynomials = HashMap::new();
-    let quarter = |turn: Ratio| if turn.1 <= 2 { Some(turn.0 * (2 / turn.1)) } else { None };
+    let quarter = |turn: IntegerRatio| if turn.1 <= 2 { Some(turn.0 * (2 / turn.1)) } else { None };
     for op in &dag.ops {
         let Op::Primitive { function, of, .. } = *op else { continue };
         let own = matches!(function, Function::Exp | Function::Tanh) == real && is_function_of_sums(function);
@@ -110,10 +110,12 @@ fn family(dag: &Dag, real: bool) -> ArgumentFamily {
             // independent of the other arguments: kept
             let (leading, inverse) = (leading.clone(), if p < 0 { (-q, -p) } else { (q, p) });
             made.resize(out.kept.len(), (0, 1));
-            let minus = |x: &Ratio| times((-x.0, x.1), inverse);
-            let row: Option<Vec<Ratio>> = made.iter().map(minus).chain([Some(inverse)]).collect();
+            let minus = |x: &IntegerRatio| times((-x.0, x.1), inverse);
+            let row: Option<Vec<IntegerRatio>> = made.iter().map(minus).chain([Some(inverse)]).collect();
             let scaled = rest.iter().map(|(m, c)| Some((m.clone(), times(*c, inverse)?)));
-            let (Some(row), Some(scaled)) = (row, scaled.collect::<Option<Polynomial>>()) else { continue };
+            let (Some(row), Some(scaled)) = (row, scaled.collect::<Option<SlotPolynomial>>()) else {
+                continue;
+            };
             reduced.push((leading, scaled, row));
             made = vec![(0, 1); out.kept.len()];
             made.push((1, 1));
@@ -129,7 +131,7 @@ fn family(dag: &Dag, real: bool) -> ArgumentFamily {
         }
     }
     for (of, quarters, made) in found {
-        let times = |(k, ratio): (usize, &Ratio)| (k, ratio.0 * (out.kept[k].2 / ratio.1));
+        let times = |(k, ratio): (usize, &IntegerRatio)| (k, ratio.0 * (out.kept[k].2 / ratio.1));
         let of_parts = made.iter().enumerate().map(times).filter(|(_, n)| *n != 0).collect();
         out.parts.insert(of, ArgumentParts { of: of_parts, quarters });
     }
@@ -138,7 +140,10 @@ fn family(dag: &Dag, real: bool) -> ArgumentFamily {
 
 /// Subtracts multiples of reduced polynomials from `rest` as long as it contains their leading monomials.
 /// Returns the multiples, by kept arguments; `None` beyond small numbers.
-fn reduce(rest: &mut Polynomial, reduced: &[(Monomial, Polynomial, Vec<Ratio>)]) -> Option<Vec<Ratio>> {
+fn reduce(
+    rest: &mut SlotPolynomial,
+    reduced: &[(SlotPowers, SlotPolynomial, Vec<IntegerRatio>)],
+) -> Option<Vec<IntegerRatio>> {
     let mut made = vec![(0, 1); reduced.len()];
     for (leading, polynomial, row) in reduced {
         let Some(&factor) = rest.get(leading) else { continue };
@@ -152,7 +157,7 @@ fn reduce(rest: &mut Polynomial, reduced: &[(Monomial, Polynomial, Vec<Ratio>)])
     Some(made)
 }
 
-fn add(sum: &mut Polynomial, monomial: Monomial, c: Ratio) -> Option<()> {
+fn add(sum: &mut SlotPolynomial, monomial: SlotPowers, c: IntegerRatio) -> Option<()> {
     let new = plus(sum.get(&monomial).copied().unwrap_or((0, 1)), c)?;
     match new.0 {
         0 => drop(sum.remove(&monomial)),
@@ -162,13 +167,17 @@ fn add(sum: &mut Polynomial, monomial: Monomial, c: Ratio) -> Option<()> {
 }
 
 /// A node as a polynomial; `None` if it is too large.
-fn polynomial(dag: &Dag, node: usize, known: &mut HashMap<usize, Option<Polynomial>>) -> Option<Polynomial> {
+fn polynomial(
+    dag: &Dag,
+    node: usize,
+    known: &mut HashMap<usize, Option<SlotPolynomial>>,
+) -> Option<SlotPolynomial> {
     if let Some(found) = known.get(&node) {
         return found.clone();
     }
-    let one = || Some(Polynomial::from([(vec![(node, 1)], (1, 1))]));
-    let number = |x: Ratio| {
-        let mut out = Polynomial::new();
+    let one = || Some(SlotPolynomial::from([(vec![(node, 1)], (1, 1))]));
+    let number = |x: IntegerRatio| {
+        let mut out = SlotPolynomial::new();
         add(&mut out, Vec::new(), x)?;
         Some(out)
     };
@@ -178,7 +187,7 @@ fn polynomial(dag: &Dag, node: usize, known: &mut HashMap<usize, Option<Polynomi
             let minus = matches!(dag.ops[node], Op::Subtract(..));
             let (left, right) = (polynomial(dag, a, known), polynomial(dag, b, known));
             left.zip(right).and_then(|(mut sum, right)| {
-                let signed = |(p, q): Ratio| if minus { (-p, q) } else { (p, q) };
+                let signed = |(p, q): IntegerRatio| if minus { (-p, q) } else { (p, q) };
                 right.into_iter().try_for_each(|(m, c)| add(&mut sum, m, signed(c)))?;
                 Some(sum)
             })
@@ -201,8 +210,8 @@ fn polynomial(dag: &Dag, node: usize, known: &mut HashMap<usize, Option<Polynomi
     out
 }
 
-fn product(left: &Polynomial, right: &Polynomial) -> Option<Polynomial> {
-    let mut out = Polynomial::new();
+fn product(left: &SlotPolynomial, right: &SlotPolynomial) -> Option<SlotPolynomial> {
+    let mut out = SlotPolynomial::new();
     for (m, &c) in left {
         for (n, &d) in right {
             let mut powers: BTreeMap<usize, u32> = m.iter().copied().collect();

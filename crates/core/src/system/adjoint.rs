@@ -18,7 +18,7 @@ use super::values::Values;
 use super::work::Sweeps;
 
 /// Power series in time, as its coefficients.
-type Series<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
+type TaylorSeries<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
 
 /// Length of the first series: most runs need no more orders.
 const SHORT: usize = 16;
@@ -40,12 +40,12 @@ pub(super) struct Adjoint<'a, S: Values> {
     enough: usize,
     values: Taylor<'a, S>,
     /// Factors of every quotient: one over the divisor, and minus the quotient over the divisor.
-    quotients: Vec<Option<[Series<S>; 2]>>,
+    quotients: Vec<Option<[TaylorSeries<S>; 2]>>,
     plan: RefCell<S::Plan>,
     /// Order of the differentials in `held`.
     order: usize,
     /// Factors of the differentials, by output and slot.
-    held: Vec<Vec<Option<Series<S>>>>,
+    held: Vec<Vec<Option<TaylorSeries<S>>>>,
 }
 
 impl<'a, S: Values> Adjoint<'a, S> {
@@ -118,7 +118,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         let quotient = |(i, op): (usize, &Op)| match *op {
             Op::Divide(_, b) if self.values.takes_part(i) && !self.values.is_known(i) => {
                 let below = inverse(f, self.values.series(b), n);
-                let ratio: Series<S> = self.values.series(i).iter().map(|x| f.neg(x)).collect();
+                let ratio: TaylorSeries<S> = self.values.series(i).iter().map(|x| f.neg(x)).collect();
                 // a key that no other factor has
                 let other = self.products(&ratio, &[(usize::MAX - i, &below)], n);
                 Some([below, other.into_iter().next()?])
@@ -138,7 +138,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
     /// Advances the differentials by one order.
     fn step(&mut self) {
         let (f, n) = (&self.f, self.length - self.order - 1);
-        let next = |held: &Vec<Option<Series<S>>>| {
+        let next = |held: &Vec<Option<TaylorSeries<S>>>| {
             let seeds = held.iter().zip(&self.signals).filter_map(|(w, signal)| match (w, signal) {
                 (Some(w), Signal::State { rate }) => Some((*rate, w[..n].to_vec())),
                 _ => None,
@@ -167,7 +167,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
     }
 
     /// Rows of an order, one for each output. Orders must not decrease from call to call.
-    pub(super) fn rows(&mut self, order: usize) -> Vec<Series<S>> {
+    pub(super) fn rows(&mut self, order: usize) -> Vec<TaylorSeries<S>> {
         if order >= self.length {
             self.length = self.length_for(order);
             self.begin();
@@ -176,7 +176,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
             self.step();
         }
         let f = &self.f;
-        let row = |held: &Vec<Option<Series<S>>>| {
+        let row = |held: &Vec<Option<TaylorSeries<S>>>| {
             let mut row = vec![f.zero(); self.lanes];
             for ((w, signal), start) in held.iter().zip(&self.signals).zip(&self.initial) {
                 let Some(w) = w else { continue };
@@ -196,9 +196,9 @@ impl<'a, S: Values> Adjoint<'a, S> {
     }
 
     /// Factors of the differentials of slots, from those of nodes, for the first `n` orders.
-    fn sweep(&self, seeds: Vec<(usize, Series<S>)>, n: usize) -> Vec<Option<Series<S>>> {
+    fn sweep(&self, seeds: Vec<(usize, TaylorSeries<S>)>, n: usize) -> Vec<Option<TaylorSeries<S>>> {
         let f = &self.f;
-        let mut left: Vec<Option<Series<S>>> = vec![None; self.dag.ops.len()];
+        let mut left: Vec<Option<TaylorSeries<S>>> = vec![None; self.dag.ops.len()];
         let mut slots = vec![None; self.signals.len()];
         let last = seeds.iter().map(|s| s.0).max().unwrap_or(0);
         for (node, w) in seeds {
@@ -251,7 +251,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
         slots
     }
 
-    fn put(&self, place: &mut Option<Series<S>>, w: Series<S>) {
+    fn put(&self, place: &mut Option<TaylorSeries<S>>, w: TaylorSeries<S>) {
         match place {
             None => *place = Some(w),
             Some(sum) => sum.iter_mut().zip(&w).for_each(|(x, y)| *x = self.f.add(x, y)),
@@ -260,7 +260,12 @@ impl<'a, S: Values> Adjoint<'a, S> {
 
     /// First `n` coefficients of the products of a series with others, each with its own key; a constant is
     /// a series of length one.
-    fn products(&self, w: &[S::Element], factors: &[(usize, &[S::Element])], n: usize) -> Vec<Series<S>> {
+    fn products(
+        &self,
+        w: &[S::Element],
+        factors: &[(usize, &[S::Element])],
+        n: usize,
+    ) -> Vec<TaylorSeries<S>> {
         let f = &self.f;
         if factors.iter().all(|(_, b)| b.len() > 1) {
             return f.products(&mut self.plan.borrow_mut(), w, factors, n);
@@ -274,7 +279,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
 }
 
 /// First `n` coefficients of one over a series.
-fn inverse<S: Values>(f: &S, b: &[S::Element], n: usize) -> Series<S> {
+fn inverse<S: Values>(f: &S, b: &[S::Element], n: usize) -> TaylorSeries<S> {
     // no divisor is zero: otherwise the series would not exist
     let first = f.inverse(&b[0]).unwrap_or(f.zero());
     let mut out = vec![first];

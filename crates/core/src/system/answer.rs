@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::branches::{BranchSide, branches};
 use super::constraints::ConstraintFactor;
-use super::counts::{Count, CountLimits, Solutions, values_taken};
+use super::counts::{CountLimits, SolutionCount, Solutions, values_taken};
 use super::error::ModelError;
 use super::functions::gcd;
 use super::identifiable::{identifiable_functions, terms_of};
@@ -397,7 +397,7 @@ fn shown_by(model: &SystemModel, compiled: &Compiled, unknown: &Unknown) -> Opti
     None
 }
 
-fn number_of_solutions(count: Count, unique: bool) -> NumberOfSolutions {
+fn number_of_solutions(count: SolutionCount, unique: bool) -> NumberOfSolutions {
     match (count, unique) {
         (Ok(1) | Err(_), true) => NumberOfSolutions::OneByExpression,
         (Ok(k), true) => NumberOfSolutions::Undecided(format!(

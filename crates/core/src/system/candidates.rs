@@ -7,7 +7,7 @@ use toml::Value;
 
 use super::error::ModelError;
 use super::model::{Candidate, FilePlace, MAX_EXPERIMENTS, Named, PlacedExpression, SystemModel};
-use super::reader::{Entry, ModelReader, base};
+use super::reader::{ModelEntry, ModelReader, base};
 use crate::language::{Expression, Node, Shape, Shapes, nearest, parse_components};
 
 /// Words for groups of candidates, with their meanings.
@@ -209,7 +209,7 @@ impl SystemModel {
 impl ModelReader<'_> {
     /// Candidate of an entry of the table `candidates`: an expression, or a table with expression, cost,
     /// unit, description.
-    pub(super) fn file_candidate(&self, (key, value): Entry<'_>) -> Result<Candidate, ModelError> {
+    pub(super) fn file_candidate(&self, (key, value): ModelEntry<'_>) -> Result<Candidate, ModelError> {
         let (name, span) = (base(key), value.span());
         let what = format!("the candidate {name}");
         let table = value.get_ref().as_table();

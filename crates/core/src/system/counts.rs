@@ -23,7 +23,7 @@ const BEYOND: usize = 3;
 const OTHERS: usize = 2;
 
 /// Number of values of an unknown, or the reason why it is not decided.
-pub(super) type Count = Result<usize, NotCounted>;
+pub(super) type SolutionCount = Result<usize, NotCounted>;
 
 /// Limits of work, in products of two coefficients at each of two points.
 #[derive(Debug, Clone, Copy)]
@@ -39,9 +39,9 @@ pub(super) struct CountLimits {
 pub(super) struct Solutions {
     /// Number of values of every unknown, in the order of the layout, on which two random points in the two
     /// fields agree; `None` for unknowns that are not observable.
-    pub(super) counts: Vec<Option<Count>>,
+    pub(super) counts: Vec<Option<SolutionCount>>,
     /// Number of values of every function, on which both fields agree.
-    pub(super) of_functions: Vec<Count>,
+    pub(super) of_functions: Vec<SolutionCount>,
     /// Order of the derivatives of the outputs with which solutions were counted.
     pub(super) order: usize,
     /// Maps that take every solution to another, in words, if there are several solutions.
@@ -49,7 +49,7 @@ pub(super) struct Solutions {
 }
 
 /// Model, fields and order for counting solutions.
-struct Counting<'a> {
+struct SolutionCounting<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
@@ -75,7 +75,7 @@ impl CountStage {
     }
 }
 
-impl Counting<'_> {
+impl SolutionCounting<'_> {
     /// Random stream of the point in a field: the same at every call.
     fn random(&self, i: usize) -> SplitMix64 {
         self.model.random(self.seed, &format!("solutions, field {i}"))
@@ -105,7 +105,7 @@ impl Counting<'_> {
     }
 
     /// Numbers of solutions in a field.
-    fn counts(&self, i: usize, fibre: &Result<Fibre, NotCounted>) -> Vec<Count> {
+    fn counts(&self, i: usize, fibre: &Result<Fibre, NotCounted>) -> Vec<SolutionCount> {
         let roots = |p: &Result<Vec<u64>, NotCounted>| {
             p.as_ref().map(|p| polynomial::distinct_roots(&self.fields[i], p)).map_err(|e| *e)
         };
@@ -116,7 +116,7 @@ impl Counting<'_> {
     }
 
     /// Number on which both fields agree.
-    fn agreed_number(&self, both: (Count, Count)) -> Count {
+    fn agreed_number(&self, both: (SolutionCount, SolutionCount)) -> SolutionCount {
         match both {
             (Ok(a), Ok(b)) if a != b => Err(NotCounted::Disagree),
             (Ok(a), Ok(_)) if a > 1 && !self.is_proven() => Err(NotCounted::NotClosed(a)),
@@ -126,15 +126,15 @@ impl Counting<'_> {
     }
 
     /// Numbers of the unknowns on which both fields agree.
-    fn agreed(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<Count> {
+    fn agreed(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<SolutionCount> {
         let both = self.counts(0, &fibres[0]).into_iter().zip(self.counts(1, &fibres[1]));
         both.map(|both| self.agreed_number(both)).collect()
     }
 
     /// Numbers of the functions on which both fields agree.
-    fn agreed_functions(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<Count> {
+    fn agreed_functions(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<SolutionCount> {
         let [first, second] = fibres;
-        let of = |i: usize| -> Count {
+        let of = |i: usize| -> SolutionCount {
             self.agreed_number((
                 first.as_ref().map_err(|e| *e)?.functions[i],
                 second.as_ref().map_err(|e| *e)?.functions[i],
@@ -166,10 +166,10 @@ impl Counting<'_> {
 
     /// Maps between solutions, if there are several. If derivatives of a higher order might leave fewer
     /// solutions than were counted, only the number that the maps prove is kept.
-    fn confirmed(&self, counts: &mut [Count]) -> Vec<Twin> {
+    fn confirmed(&self, counts: &mut [SolutionCount]) -> Vec<Twin> {
         let Self { model, compiled, judged, seed, fields, .. } = *self;
         let (layout, degrees) = (&judged.layout, &judged.findings.degrees);
-        let several = |c: &Count| matches!(c, Ok(2..) | Err(NotCounted::NotClosed(_)));
+        let several = |c: &SolutionCount| matches!(c, Ok(2..) | Err(NotCounted::NotClosed(_)));
         if !counts.iter().zip(&degrees.degree).any(|(c, d)| d.is_some() && several(c)) {
             return Vec::new();
         }
@@ -235,9 +235,9 @@ impl Counting<'_> {
     }
 }
 
-impl Counting<'_> {
+impl SolutionCounting<'_> {
     /// Numbers of solutions, stage by stage, as far as the limits allow.
-    fn by_stages(&self, limits: CountLimits) -> Vec<Count> {
+    fn by_stages(&self, limits: CountLimits) -> Vec<SolutionCount> {
         let nothing = RelationConsequences::default();
         let mut counts = self.agreed(&self.both(CountStage::new(0, limits.count), [&nothing; 2]));
         let others = self.others();
@@ -261,14 +261,15 @@ impl Counting<'_> {
     }
 
     /// True if a number is open that more work may decide.
-    fn is_open(&self, counts: &[Count]) -> bool {
-        let decided = |c: &Count| matches!(c, Ok(_) | Err(NotCounted::NotClosed(_) | NotCounted::TooMany));
+    fn is_open(&self, counts: &[SolutionCount]) -> bool {
+        let decided =
+            |c: &SolutionCount| matches!(c, Ok(_) | Err(NotCounted::NotClosed(_) | NotCounted::TooMany));
         let degrees = &self.judged.findings.degrees.degree;
         counts.iter().zip(degrees).any(|(c, d)| !decided(c) && d.is_some())
     }
 
     /// Counts again, and fills in numbers that were not decided before.
-    fn again(&self, counts: &mut [Count], stage: CountStage, known: [&RelationConsequences; 2]) {
+    fn again(&self, counts: &mut [SolutionCount], stage: CountStage, known: [&RelationConsequences; 2]) {
         let mut new = self.agreed(&self.both(stage, known));
         let unique = known[0].unique.iter().filter(|l| known[1].unique.contains(l));
         unique.for_each(|&lane| new[lane] = Ok(1));
@@ -281,7 +282,12 @@ impl Counting<'_> {
 
     /// Results of counting with all unknowns: a map between two solutions if `maps` has none, and the
     /// numbers of values of the functions.
-    fn of_all(&self, counts: &[Count], mut maps: Vec<String>, limit: u64) -> (Vec<String>, Vec<Count>) {
+    fn of_all(
+        &self,
+        counts: &[SolutionCount],
+        mut maps: Vec<String>,
+        limit: u64,
+    ) -> (Vec<String>, Vec<SolutionCount>) {
         let degrees = &self.judged.findings.degrees.degree;
         let two = counts.iter().zip(degrees).any(|(c, d)| d.is_some() && *c == Ok(2));
         let pairs = maps.is_empty() && two;
@@ -320,13 +326,13 @@ pub(super) fn values_taken(
         let (counts, of_functions) = (none.collect(), vec![Err(why); functions.len()]);
         return Solutions { counts, of_functions, order, maps: Vec::new() };
     };
-    let counting = Counting { model, compiled, judged, fields, seed, order, functions };
+    let counting = SolutionCounting { model, compiled, judged, fields, seed, order, functions };
     let mut counts = counting.by_stages(limits);
     let twins = counting.confirmed(&mut counts);
     let maps: Vec<String> = twins.iter().map(|t| t.words(compiled, &|role| role_name(model, role))).collect();
     let (maps, of_functions) = counting.of_all(&counts, maps, limits.count);
     let observable = counts.into_iter().zip(&degrees.degree).map(|(count, degree)| degree.and(Some(count)));
-    let counts: Vec<Option<Count>> = observable.collect();
+    let counts: Vec<Option<SolutionCount>> = observable.collect();
     let of_functions = with_single(functions, of_functions, &counts);
     Solutions { counts, of_functions, order, maps }
 }
@@ -343,7 +349,11 @@ fn role_name(model: &SystemModel, role: Role) -> String {
 }
 
 /// Counts of functions; a function of unknowns with one value each has one value.
-fn with_single(functions: &[Terms], counted: Vec<Count>, unknowns: &[Option<Count>]) -> Vec<Count> {
+fn with_single(
+    functions: &[Terms],
+    counted: Vec<SolutionCount>,
+    unknowns: &[Option<SolutionCount>],
+) -> Vec<SolutionCount> {
     let single = |terms: &Terms| terms.iter().flat_map(|t| &t.1).all(|p| unknowns[p.0] == Some(Ok(1)));
     functions.iter().zip(counted).map(|(terms, count)| if single(terms) { Ok(1) } else { count }).collect()
 }

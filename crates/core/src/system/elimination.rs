@@ -54,14 +54,19 @@ struct PolynomialEquation {
 
 /// Cost of an elimination, compared in this order: division by a parameter, division by a signal, order,
 /// number of terms.
-type Cost = (bool, bool, usize, usize);
+type EliminationCost = (bool, bool, usize, usize);
 
 /// Equation that is linear in products of parameters: their coefficients.
-type Row = BTreeMap<Monomial, Fraction>;
+type PolynomialRow = BTreeMap<Monomial, Fraction>;
 
 /// Subtracts the multiple of `row`, whose coefficient of `m` is one, that removes `m` from `other`. False if
 /// a coefficient is beyond the limits of its size.
-fn subtract_multiple(s: &mut Algebra, other: &mut Row, m: &Monomial, row: &Row) -> Result<bool, OverLimit> {
+fn subtract_multiple(
+    s: &mut Algebra,
+    other: &mut PolynomialRow,
+    m: &Monomial,
+    row: &PolynomialRow,
+) -> Result<bool, OverLimit> {
     let Some(factor) = other.get(m).map(|c| s.minus(c)) else { return Ok(true) };
     for (k, c) in row {
         if factor.terms() * c.terms() > PRODUCT {
@@ -226,7 +231,7 @@ impl Elimination<'_> {
         &mut self,
         equations: &[PolynomialEquation],
     ) -> Result<Option<(usize, usize, Fraction)>, OverLimit> {
-        let mut best: Option<(Cost, usize, usize, [Polynomial; 2])> = None;
+        let mut best: Option<(EliminationCost, usize, usize, [Polynomial; 2])> = None;
         // slope and rest together have as many terms as the equation
         let short = |e: &(usize, &PolynomialEquation)| e.1.zero.len() <= SUBSTITUTED;
         for (e, equation) in equations.iter().enumerate().filter(short) {
@@ -370,13 +375,13 @@ impl Elimination<'_> {
         open: &[usize],
     ) -> Result<Vec<(usize, Fraction)>, OverLimit> {
         let places: Vec<u32> = open.iter().map(|&p| self.system.parameters[p]).collect();
-        let mut rows: Vec<Row> = Vec::new();
+        let mut rows: Vec<PolynomialRow> = Vec::new();
         for zero in pool {
             let parts = by_products(&self.s.f, zero, &places);
             rows.push(parts.into_iter().map(|(m, c)| (m, self.s.whole(c))).collect());
         }
         let total = |m: &Monomial| m.iter().map(|x| x.1).sum::<u32>();
-        let mut done: Vec<(Monomial, Row)> = Vec::new();
+        let mut done: Vec<(Monomial, PolynomialRow)> = Vec::new();
         loop {
             rows.retain(|r| !r.is_empty());
             // eliminate products first, so that the rest is linear; of these choose the simplest pivot
@@ -389,7 +394,7 @@ impl Elimination<'_> {
                 .min_by_key(|(_, m, c, len)| (Reverse(total(m)), c.terms(), *len));
             let Some((i, m, c, _)) = pivot else { break };
             let (m, inverse) = (m.clone(), self.s.inverse(c));
-            let mut row = Row::new();
+            let mut row = PolynomialRow::new();
             for (k, c) in rows.swap_remove(i) {
                 row.insert(k, self.s.times(&c, &inverse)?);
             }

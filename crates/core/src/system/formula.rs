@@ -11,7 +11,7 @@ use obsdeg_exact::{Ratio, gcd};
 const BOUND: u64 = 1 << 29;
 
 /// Terms with integer coefficients that share no divisor, the leading one positive and first.
-type Terms = Vec<(Monomial, i64)>;
+type IntegerTerms = Vec<(Monomial, i64)>;
 
 /// Text of an expression in the names of its variables; `None` if a denominator is zero, or a coefficient is
 /// too large.
@@ -62,7 +62,7 @@ pub(super) fn text(s: &mut Algebra, e: &Fraction, names: &[String]) -> Result<Op
 }
 
 /// A polynomial with rational coefficients, multiplied to integers without a common divisor.
-fn integers(s: &Algebra, p: &Polynomial) -> Option<Terms> {
+fn integers(s: &Algebra, p: &Polynomial) -> Option<IntegerTerms> {
     let mut ratios: Vec<(Monomial, Ratio)> = Vec::new();
     for (m, c) in p.terms() {
         ratios.push((m.clone(), Ratio::within(&s.f, c, BOUND)?));
@@ -81,7 +81,7 @@ fn integers(s: &Algebra, p: &Polynomial) -> Option<Terms> {
 }
 
 /// Text of a factor: `x^2`, `(x-2*y)`, `(x+1)^3`.
-fn factor(terms: &Terms, power: u32, names: &[String]) -> String {
+fn factor(terms: &IntegerTerms, power: u32, names: &[String]) -> String {
     let mut sum = String::new();
     for (m, c) in terms {
         let sign = match (*c < 0, sum.is_empty()) {

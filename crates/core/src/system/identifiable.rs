@@ -13,7 +13,7 @@ use super::functions::gcd;
 use super::judge::{Judgement, PointDegrees, climb_at};
 use super::lie::lie_derivatives;
 use super::model::{Compiled, Role, SystemModel};
-use super::quotients::{Powers, Terms};
+use super::quotients::{QuotientPowers, Terms};
 use super::symmetry::{Invariant, Symmetries, integers, rationals};
 use super::work::Spent;
 use crate::degree::sparse::{extend_by_short_vectors, support};
@@ -165,8 +165,8 @@ fn families(judged: &Judgement, shown: &[bool]) -> Vec<ProductFamily> {
 impl ProductFamily {
     /// Products of weight zero that contain at least one unknown, short ones first; none if there are too
     /// many.
-    fn products(&self, weights: &[Vec<(usize, i64)>]) -> Vec<Powers> {
-        let mut out: Vec<(u32, Powers)> = vec![(0, Vec::new())];
+    fn products(&self, weights: &[Vec<(usize, i64)>]) -> Vec<QuotientPowers> {
+        let mut out: Vec<(u32, QuotientPowers)> = vec![(0, Vec::new())];
         for &v in &self.variables {
             let mut longer = Vec::new();
             for (size, powers) in &out {
@@ -193,7 +193,7 @@ impl ProductFamily {
         };
         out.retain(|p| weightless(&p.1));
         out.sort();
-        let products: Vec<Powers> = out.into_iter().map(|p| p.1).collect();
+        let products: Vec<QuotientPowers> = out.into_iter().map(|p| p.1).collect();
         if products.len() > PRODUCTS { Vec::new() } else { products }
     }
 }
@@ -273,12 +273,12 @@ impl<'a> FunctionSearch<'a> {
         self.all.saturating_sub(self.known.rank())
     }
 
-    fn gradient(&self, terms: &[(i64, Powers)], at: &PointDegrees<Field>) -> Vec<u64> {
+    fn gradient(&self, terms: &[(i64, QuotientPowers)], at: &PointDegrees<Field>) -> Vec<u64> {
         gradient(&at.span.field(), self.judged.layout.unknowns.len(), terms, at)
     }
 
     /// Adds the functions among sums of products.
-    fn among(&mut self, products: &[Powers]) -> Result<(), ModelError> {
+    fn among(&mut self, products: &[QuotientPowers]) -> Result<(), ModelError> {
         let f = self.f;
         let mut basis = Echelon::new(f, products.len());
         let (mut rank, mut still, mut k) = (0, 0, 0);
@@ -294,7 +294,7 @@ impl<'a> FunctionSearch<'a> {
             let values: Vec<u64> = products.iter().map(|p| product(&f, p, &at.values, &inverses)).collect();
             for v in directions {
                 // m sum_c e_c v_c / x_c
-                let entry = |(powers, &m): (&Powers, &u64)| {
+                let entry = |(powers, &m): (&QuotientPowers, &u64)| {
                     let along = powers.iter().fold(0, |s, &(c, e)| {
                         f.add(s, f.mul(f.from_i64(e.into()), f.mul(v[c], inverses[c])))
                     });
@@ -374,7 +374,7 @@ fn product(f: &Field, powers: &[(usize, i32)], values: &[u64], inverses: &[u64])
 }
 
 /// Differential of a function at a point (shape: unknowns).
-fn gradient(f: &Field, n: usize, terms: &[(i64, Powers)], at: &PointDegrees<Field>) -> Vec<u64> {
+fn gradient(f: &Field, n: usize, terms: &[(i64, QuotientPowers)], at: &PointDegrees<Field>) -> Vec<u64> {
     let inverses: Vec<u64> = at.values.iter().map(|&x| f.inv(x)).collect();
     let mut out = vec![0; n];
     for (number, powers) in terms {
@@ -389,7 +389,7 @@ fn gradient(f: &Field, n: usize, terms: &[(i64, Powers)], at: &PointDegrees<Fiel
 impl IdentifiableFunction {
     /// Function in words: `S*w`, `U*w + I*w`, `beta/(N*w)`; common factors stand before brackets.
     pub(super) fn text(&self, name: &dyn Fn(usize) -> String) -> String {
-        let common: Powers = match self.terms.len() {
+        let common: QuotientPowers = match self.terms.len() {
             0 | 1 => Vec::new(),
             _ => self.terms[0]
                 .1
@@ -401,7 +401,7 @@ impl IdentifiableFunction {
         let divisor = self.terms.iter().fold(0, |g, t| gcd(g, t.0)).max(1);
         let mut sum = String::new();
         for (number, powers) in &self.terms {
-            let rest: Powers = powers.iter().copied().filter(|p| !common.contains(p)).collect();
+            let rest: QuotientPowers = powers.iter().copied().filter(|p| !common.contains(p)).collect();
             let number = number / divisor;
             sum.push_str(match (sum.is_empty(), number < 0) {
                 (true, true) => "-",
@@ -450,7 +450,7 @@ mod tests {
     #[test]
     fn functions_are_written_with_their_common_factors() {
         let name = |c: usize| ["w", "U", "I", "b", "N"][c].to_string();
-        let text = |terms: Vec<(i64, Powers)>| IdentifiableFunction { terms, degree: 0 }.text(&name);
+        let text = |terms: Vec<(i64, QuotientPowers)>| IdentifiableFunction { terms, degree: 0 }.text(&name);
         assert_eq!(text(vec![(1, vec![(3, 1), (4, -1), (0, -1)])]), "b/(N*w)");
         assert_eq!(text(vec![(2, vec![(0, 1), (1, 1)]), (-4, vec![(0, 1), (2, 2)])]), "w*(U - 2*I^2)");
         assert_eq!(text(vec![(1, vec![(1, 1), (4, -1)]), (1, vec![(2, 1), (4, -1)])]), "(U + I)/N");

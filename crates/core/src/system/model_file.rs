@@ -14,7 +14,7 @@ use super::model::{
     Named, PlacedExpression, StartTime, State, StateStart, SystemModel, check_signs,
 };
 use super::nominal::{SimulationEntry, nominal};
-use super::reader::{Entry, Formulas, ModelReader, base, declared, in_order, last_mention};
+use super::reader::{Formulas, ModelEntry, ModelReader, base, declared, in_order, last_mention};
 use crate::language::file_error::explain;
 use crate::language::{Node, Shape, Shapes, nearest, parse};
 use crate::model::recording::{ModelRecord, Recording};
@@ -450,7 +450,7 @@ impl ModelReader<'_> {
             model.parameters = self.parameters(parameters)?;
         }
         let (constants, definitions) = (in_order(&file.constants), in_order(&file.definitions));
-        let all: [&[Entry<'_>]; 6] = [&states, &algebraic, &known, &unknown, &constants, &definitions];
+        let all: [&[ModelEntry<'_>]; 6] = [&states, &algebraic, &known, &unknown, &constants, &definitions];
         self.names_of_their_own(&all, &model.parameters)?;
         for (key, value) in self.by_use("the constant", &constants)? {
             model.constants.extend(self.constants(key, value)?);

@@ -11,10 +11,10 @@ use super::undecided::{NotCounted, SOLUTIONS};
 const REMAINDER: u64 = 100_000;
 
 /// Product of powers: `(unknown, exponent)`.
-pub(super) type Powers = Vec<(usize, i32)>;
+pub(super) type QuotientPowers = Vec<(usize, i32)>;
 
 /// Sum of products of powers with integer coefficients.
-pub(super) type Terms = Vec<(i64, Powers)>;
+pub(super) type Terms = Vec<(i64, QuotientPowers)>;
 
 /// Quotient ring of equations by their Groebner basis.
 pub(super) struct Quotients<'a> {

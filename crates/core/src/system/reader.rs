@@ -13,10 +13,10 @@ use crate::language::{Expression, MAX_ENTRIES, Node, Shape, Shapes, parse_compon
 use crate::model::angle::excerpt;
 
 /// Key with its value.
-pub(super) type Entry<'a> = (&'a String, &'a Spanned<Value>);
+pub(super) type ModelEntry<'a> = (&'a String, &'a Spanned<Value>);
 
 /// Entries in the order of the file.
-pub(super) fn in_order(map: &BTreeMap<String, Spanned<Value>>) -> Vec<Entry<'_>> {
+pub(super) fn in_order(map: &BTreeMap<String, Spanned<Value>>) -> Vec<ModelEntry<'_>> {
     let mut out: Vec<_> = map.iter().collect();
     out.sort_by_key(|(_, v)| v.span().start);
     out
@@ -99,7 +99,7 @@ fn texts(value: &Value) -> Vec<&str> {
 ///
 /// # Errors
 /// Names of a cycle, the first one again at its end.
-fn by_use<'a>(entries: &[Entry<'a>]) -> Result<Vec<Entry<'a>>, Vec<usize>> {
+fn by_use<'a>(entries: &[ModelEntry<'a>]) -> Result<Vec<ModelEntry<'a>>, Vec<usize>> {
     let place: HashMap<&str, usize> = entries.iter().enumerate().map(|(i, e)| (base(e.0), i)).collect();
     let uses = |i: usize| -> Vec<usize> {
         let texts = texts(entries[i].1.get_ref());
@@ -248,7 +248,7 @@ impl ModelReader<'_> {
     /// Checks that no vector has the name of another entry.
     pub(super) fn names_of_their_own(
         &self,
-        sections: &[&[Entry<'_>]],
+        sections: &[&[ModelEntry<'_>]],
         parameters: &[Named],
     ) -> Result<(), ModelError> {
         let keys = sections.iter().flat_map(|s| s.iter()).map(|(key, value)| (base(key), value.span()));
@@ -266,7 +266,11 @@ impl ModelReader<'_> {
     }
 
     /// Entries sorted so that each comes after those that it names.
-    pub(super) fn by_use<'e>(&self, kind: &str, entries: &[Entry<'e>]) -> Result<Vec<Entry<'e>>, ModelError> {
+    pub(super) fn by_use<'e>(
+        &self,
+        kind: &str,
+        entries: &[ModelEntry<'e>],
+    ) -> Result<Vec<ModelEntry<'e>>, ModelError> {
         by_use(entries).map_err(|circle| {
             let names: Vec<&str> = circle.iter().map(|&i| base(entries[i].0)).collect();
             let message = format!("a circle: {}; expected an end to it", names.join(" -> "));

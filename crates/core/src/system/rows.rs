@@ -8,7 +8,7 @@ use super::branches::{Signs, sided};
 use super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
 use super::taylor::{Initial, Signal, Singular, Taylor};
 use super::values::Values;
-use super::work::{Cost, Sweeps, Work, WorkStep, product};
+use super::work::{RowCost, Sweeps, Work, WorkStep, product};
 use crate::degree::rows::DerivativeRows;
 
 mod by_output;
@@ -510,9 +510,9 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
 }
 
 /// Cost of the rows of a run.
-fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: Option<Sweeps>, outputs: usize) -> Cost {
+fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: Option<Sweeps>, outputs: usize) -> RowCost {
     let [fixed, growing, nodes, products] = taylor.operations();
-    Cost {
+    RowCost {
         fixed,
         growing,
         nodes,

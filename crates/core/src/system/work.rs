@@ -143,7 +143,7 @@ pub(super) struct Sweeps {
 
 /// Cost of the derivatives of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Cost {
+pub(super) struct RowCost {
     /// Products and sums of an order that do not grow with it, by unknowns.
     pub(super) fixed: u64,
     /// Products and sums of an order for each order before it, by unknowns.
@@ -163,7 +163,7 @@ pub(super) struct Cost {
     pub(super) words: u64,
 }
 
-impl Cost {
+impl RowCost {
     /// Operations of the rows of an order, with their elimination.
     fn operations(&self, order: u64) -> u64 {
         let next = order.saturating_add(1);
@@ -212,7 +212,7 @@ impl Work {
     }
 
     /// Counts the rows of an order before they are computed; false if they exceed the limit.
-    pub(super) fn spend(&self, order: usize, cost: &Cost) -> bool {
+    pub(super) fn spend(&self, order: usize, cost: &RowCost) -> bool {
         let (operations, bytes) = (cost.operations(order as u64), cost.bytes(order as u64));
         self.take(WorkStep::Derivatives(order), operations, bytes).is_ok()
     }
@@ -266,8 +266,8 @@ impl Spent {
 mod tests {
     use super::*;
 
-    fn cost(backwards: Option<Sweeps>) -> Cost {
-        Cost { fixed: 10, growing: 6, nodes: 5, products: 3, backwards, outputs: 2, lanes: 7, words: 1 }
+    fn cost(backwards: Option<Sweeps>) -> RowCost {
+        RowCost { fixed: 10, growing: 6, nodes: 5, products: 3, backwards, outputs: 2, lanes: 7, words: 1 }
     }
 
     /// By hand: 10 + 6 * 4 for the rows of order 3, and 2 rows of 7 against a rank of at most 7.
@@ -285,14 +285,14 @@ mod tests {
         let (transforms, long) = (256 * 8 * 9 / 4, Sweeps { longest: 108, count: 1, values: [200, 200] });
         assert_eq!(cost(Some(long)).operations(200), 2 * (5 * 108 + 3 * transforms) + elimination);
         assert_eq!(cost(Some(long)).bytes(3), 8 * (5 * 4 * 200 + 2 * 49));
-        assert_eq!(Cost { words: 3, ..cost(None) }.operations(0), 9 * (10 + 6 + 2 * 7 * 2));
+        assert_eq!(RowCost { words: 3, ..cost(None) }.operations(0), 9 * (10 + 6 + 2 * 7 * 2));
         assert_eq!(cost(None).bytes(3), 8 * ((10 + 5) * 4 + 2 * 49));
     }
 
     #[test]
     fn what_is_beyond_is_refused_with_its_option() {
         let work = Work::new(WorkLimit(1000));
-        let large = Cost { growing: 400_000_000, ..cost(None) };
+        let large = RowCost { growing: 400_000_000, ..cost(None) };
         assert!(work.spend(0, &large) && work.refused().is_none());
         assert!(!work.spend(1, &large));
         assert_eq!(work.spent.get(), 400_000_000 + 10 + 28);
@@ -304,7 +304,7 @@ mod tests {
             "{message}"
         );
         let work = Work::new(WorkLimit(1000));
-        assert!(!work.spend(9, &Cost { fixed: 10_000_000, ..cost(None) }));
+        assert!(!work.spend(9, &RowCost { fixed: 10_000_000, ..cost(None) }));
         let message = work.refused().expect("refused").to_string();
         assert!(message.contains("order 9 take 8.0e8 bytes"), "{message}");
     }

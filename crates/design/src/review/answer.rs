@@ -111,7 +111,7 @@ pub struct GravitySample {
 }
 
 /// Value of a condition, with the predicted sigma of every unknown.
-pub(super) type Point = (f64, Vec<(String, Option<f64>)>);
+pub(super) type CurvePoint = (f64, Vec<(String, Option<f64>)>);
 
 /// Predicted sigmas against a condition, with a bench total uncertainties.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -125,7 +125,7 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    pub(super) fn of(points: Vec<Point>) -> Self {
+    pub(super) fn of(points: Vec<CurvePoint>) -> Self {
         let mut out = Self::default();
         for (x, of) in points {
             let (names, sigmas) = of.into_iter().unzip();

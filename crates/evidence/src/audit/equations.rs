@@ -219,7 +219,7 @@ fn plain_line(place: &str, claim: &str, pairs: &[(&str, &str)], seed: u64) -> Re
 }
 
 /// Equation with its number, as printed, and both sides of each of its components.
-type Equation<'a> = (&'a str, &'a str, &'a [(&'a str, &'a str)]);
+type PrintedEquation<'a> = (&'a str, &'a str, &'a [(&'a str, &'a str)]);
 
 /// Lines of the equations as printed: the output with its derivatives, (6), (9), (10), (12), the solution,
 /// (13)-(18), and g^c, (20).
@@ -230,7 +230,7 @@ fn output_lines(seed: u64) -> Result<Vec<Line>, AnalysisError> {
         ("Zcz", "-(gx*psi_y - gy*psi_x)"),
     ];
     let second = [("Z1pp", "-(wN^2 + wU^2)*pz + wU*ex - wN*ey"), ("Z3pp", "wU^2*px - wU*wN*py + wU*ez")];
-    let all: [Equation<'_>; 11] = [
+    let all: [PrintedEquation<'_>; 11] = [
         ("(6)", "Z = -[g^c x] psi", &cross),
         ("(9)", "Z^n = (psi_z, 0, -psi_x)", &[("Z1", "pz"), ("Z3", "-px")]),
         (

@@ -83,7 +83,7 @@ pub(super) fn functional(
 }
 
 /// Samples of a scheme at the dwells, in every precision of `BITS`.
-pub(super) type Samples<'a> = precise::Samples<'a, { BITS.len() }>;
+pub(super) type Samples<'a> = precise::PreciseSamples<'a, { BITS.len() }>;
 
 /// Samples of `scheme` at the dwells.
 pub(super) fn samples(scheme: &Scheme) -> Samples<'_> {

@@ -32,7 +32,7 @@ pub(super) fn biases(gyros: &[SensorNoise; 3], accelerometer: &SensorNoise) -> V
 }
 
 /// Transition and noise covariance `(Phi, Q)` of some states over a step.
-pub(super) type Step = (DMatrix<f64>, DMatrix<f64>);
+pub(super) type NoiseStep = (DMatrix<f64>, DMatrix<f64>);
 
 /// Lower triangular root of a covariance, zero in directions without noise.
 pub(super) fn root(q: &DMatrix<f64>) -> DMatrix<f64> {

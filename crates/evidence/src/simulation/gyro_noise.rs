@@ -13,7 +13,7 @@ use obsdeg_core::model::{Float, Matrix3, local_dynamics};
 use obsdeg_ekf::SensorNoise;
 use obsdeg_ekf::noise::discretised;
 
-use super::biases::{Bias, Sensor, Step, root};
+use super::biases::{Bias, NoiseStep, Sensor, root};
 use super::error::SimulationError;
 use super::noise::Noise;
 use super::plan::{Plan, SegmentKind};
@@ -33,7 +33,7 @@ impl Plan {
     /// states are psi (in the axes of the unknowns) and the m biases, 3 + m in all. The matrices are exact at
     /// a position. While the platform turns, the step is divided into parts of at most 0.02 rad with the
     /// attitude of their middle.
-    pub(super) fn bias_step(&self, segment: usize) -> Result<Step, SimulationError> {
+    pub(super) fn bias_step(&self, segment: usize) -> Result<NoiseStep, SimulationError> {
         let s = &self.segments[segment];
         let n = 3 + self.biases.len();
         let parts = match &s.kind {
@@ -61,7 +61,7 @@ impl Plan {
     }
 
     /// Dynamics F and noise density Q of psi^n and the biases at the attitude `C_c^n`.
-    fn bias_model(&self, attitude: &Matrix3<f64>) -> Step {
+    fn bias_model(&self, attitude: &Matrix3<f64>) -> NoiseStep {
         let n = 3 + self.biases.len();
         let (mut f, mut q) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
         let local = local_dynamics(&Float, &self.point.w_n, &self.point.w_u);
@@ -125,7 +125,7 @@ impl Plan {
 pub(super) struct Gyros {
     h: f64,
     /// Transition and root of the noise covariance, `(Phi, root of Q)`, of angle and biases, by gyro.
-    steps: Vec<Step>,
+    steps: Vec<NoiseStep>,
 }
 
 impl Gyros {

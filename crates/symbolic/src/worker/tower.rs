@@ -267,7 +267,7 @@ impl Tower {
         let halves: Vec<u32> = (first..self.variables.len())
             .map(|v| polynomials().map(|p| degree(p, v)).max().unwrap_or(0).div_ceil(2))
             .collect();
-        let ways = [Powers::OfSine, Powers::OfCosine].map(|powers| {
+        let ways = [Reduction::OfSine, Reduction::OfCosine].map(|powers| {
             let mut numerator = Atom::num(0);
             for (i, x) in parts.iter().enumerate() {
                 let product = (0..self.generators.len())
@@ -284,7 +284,7 @@ impl Tower {
     }
 
     /// Polynomial over `product (1 + t_a^2)^half_a`, in cosines and sines.
-    fn in_angles(&self, p: &Polynomial, halves: &[u32], powers: Powers) -> Atom {
+    fn in_angles(&self, p: &Polynomial, halves: &[u32], powers: Reduction) -> Atom {
         let first = self.variables.len() - self.angles.len();
         let mut sum = Atom::num(0);
         for term in p {
@@ -306,7 +306,7 @@ pub(crate) type Polynomial = MultivariatePolynomial<IntegerRing, u16>;
 
 /// Function whose powers above one are kept; the square of the other is replaced.
 #[derive(Clone, Copy)]
-enum Powers {
+enum Reduction {
     OfSine,
     OfCosine,
 }
@@ -318,7 +318,7 @@ pub(crate) fn degree(p: &Polynomial, variable: usize) -> u32 {
 
 /// Fraction `t^j / (1+t^2)^m = cos^(2m-j)(a/2) sin^j(a/2)` in the cosine and sine of `a`, for `j <=
 /// 2m`.
-fn trigonometric(angle: &str, j: u32, m: u32, powers: Powers) -> Atom {
+fn trigonometric(angle: &str, j: u32, m: u32, powers: Reduction) -> Atom {
     let (c, s) = (Atom::var(symbol!(format!("c_{angle}"))), Atom::var(symbol!(format!("s_{angle}"))));
     let half = Atom::num((1, 2));
     // an odd power is one sine times an even one: sin(a/2) cos(a/2) = s/2
@@ -327,8 +327,8 @@ fn trigonometric(angle: &str, j: u32, m: u32, powers: Powers) -> Atom {
     let up = ((Atom::num(1) + &c) * &half).pow(i64::from(m - j / 2));
     let in_cosine = (down * up).expand();
     let in_cosine = match powers {
-        Powers::OfCosine => in_cosine,
-        Powers::OfSine => (0..=i64::from(m)).fold(Atom::num(0), |sum, k| {
+        Reduction::OfCosine => in_cosine,
+        Reduction::OfSine => (0..=i64::from(m)).fold(Atom::num(0), |sum, k| {
             // the coefficient of c^k, times c^(k mod 2) (1-s^2)^(k/2)
             let coefficient = match k {
                 0 => in_cosine.replace(c.clone()).with(Atom::num(0)),

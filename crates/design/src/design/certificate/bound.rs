@@ -120,7 +120,7 @@ impl Additive {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{BallRing, Real, real};
+    use super::super::exact::{BallReal, BallRing, real};
     use super::super::weights::weigh;
     use super::*;
     use crate::design::measure::criterion::{Criterion, SigmaLimits};
@@ -130,13 +130,13 @@ mod tests {
     use obsdeg_exact::SplitMix64;
 
     /// Bound that an X proves, in 512 bits, for the information of the candidates in double precision.
-    fn proven(evaluator: &Evaluator, k: usize, problem: &Additive, dual: &DualVariables) -> Real {
+    fn proven(evaluator: &Evaluator, k: usize, problem: &Additive, dual: &DualVariables) -> BallReal {
         let (n, m) = (evaluator.n, problem.unknowns());
-        let columns: Vec<Vec<Real>> =
+        let columns: Vec<Vec<BallReal>> =
             dual.x.column_iter().map(|c| c.iter().copied().map(real).collect()).collect();
         let square = real(evaluator.dph).mul(&real(evaluator.dph));
         let energy = |entry: &dyn Fn(usize, usize) -> f64| {
-            let mut sum = Real::ZERO;
+            let mut sum = BallReal::ZERO;
             for x in &columns {
                 for (i, j) in (0..m).flat_map(|i| (0..m).map(move |j| (i, j))) {
                     sum = sum.add(&x[i].mul(&x[j]).mul(&real(entry(i, j))));
@@ -146,32 +146,32 @@ mod tests {
         };
         let most =
             evaluator.candidates.iter().map(|c| energy(&|i, j| c.own[(3 + i.max(j)) * n + 3 + i.min(j)]));
-        let most = most.fold(Real::ZERO, |a, b| if b.sub(&a).is_positive() { b } else { a });
+        let most = most.fold(BallReal::ZERO, |a, b| if b.sub(&a).is_positive() { b } else { a });
         let known = energy(&|i, j| if i == j { evaluator.prior.coefficients[i] } else { 0.0 });
-        let energy = most.mul(&Real::from_i64(k as i64)).add(&known).mul(&square);
+        let energy = most.mul(&BallReal::from_i64(k as i64)).add(&known).mul(&square);
         let d = problem.counting();
         let counting = |j: usize| problem.nuisance + j;
-        let over = |x: Real, y: &Real| x.div(y).expect("not zero");
+        let over = |x: BallReal, y: &BallReal| x.div(y).expect("not zero");
         let shared = |vectors: &DMatrix<f64>| {
-            let mut sum = Real::ZERO;
+            let mut sum = BallReal::ZERO;
             for (j, x) in columns.iter().enumerate() {
-                let v: Vec<Real> = vectors.column(j).iter().copied().map(real).collect();
-                let root = real(dual.shares[j]).sqrt().unwrap_or(Real::ZERO);
+                let v: Vec<BallReal> = vectors.column(j).iter().copied().map(real).collect();
+                let root = real(dual.shares[j]).sqrt().unwrap_or(BallReal::ZERO);
                 sum = sum.add(&root.mul(&BallRing.dot(v.iter().zip(x))));
             }
             over(sum.mul(&sum), &energy)
         };
-        let shares = dual.shares.iter().fold(Real::ZERO, |sum, s| sum.add(&real(*s)));
+        let shares = dual.shares.iter().fold(BallReal::ZERO, |sum, s| sum.add(&real(*s)));
         match &problem.objective {
             Objective::Volume => {
                 let logs = (0..d).map(|j| columns[j][counting(j)].abs().ln().expect("positive"));
-                let sum = logs.fold(Real::ZERO, |sum, x| sum.add(&x));
-                let mean = over(sum.shifted(1), &Real::from_i64(d as i64));
-                over(mean.exp().expect("finite").mul(&Real::from_i64(d as i64)), &energy)
+                let sum = logs.fold(BallReal::ZERO, |sum, x| sum.add(&x));
+                let mean = over(sum.shifted(1), &BallReal::from_i64(d as i64));
+                over(mean.exp().expect("finite").mul(&BallReal::from_i64(d as i64)), &energy)
             }
             Objective::Least => {
                 let squares = columns.iter().flat_map(|x| x[problem.nuisance..].iter().map(|x| x.mul(x)));
-                over(squares.fold(Real::ZERO, |sum, x| sum.add(&x)), &energy)
+                over(squares.fold(BallReal::ZERO, |sum, x| sum.add(&x)), &energy)
             }
             Objective::Mean(vectors) => over(shared(vectors), &shares),
             Objective::Largest(vectors, offsets) => {

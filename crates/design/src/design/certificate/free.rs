@@ -366,7 +366,7 @@ fn peaks(n: usize, energy: &(dyn Fn(&Matrix3<f64>) -> f64 + Sync)) -> Vec<Euler>
 
 #[cfg(test)]
 mod tests {
-    use super::super::exact::{Real, effects_of, energy_of, real};
+    use super::super::exact::{BallReal, effects_of, energy_of, real};
     use super::*;
     use crate::design::Candidates;
     use obsdeg_core::model::{Carry, Scheme};
@@ -427,7 +427,7 @@ mod tests {
             let x = DMatrix::from_fn(m, 3, |_, _| below(1 << 20) as f64 / f64::from(1 << 19) - 1.0);
             let (n, g) = (evaluator.degree(), evaluator.information_of_effects());
             let energy = |e: &Euler| evaluator.energy_bounded(e, &g, &x);
-            let mut within = |kind: usize, told: f64, truth: &Real, radius: f64, place: &str| {
+            let mut within = |kind: usize, told: f64, truth: &BallReal, radius: f64, place: &str| {
                 let off = real(told).sub(truth).to_f64().abs();
                 assert!(off <= radius, "{terms}: {place} {told:e} off by {off:e}, told {radius:e}");
                 largest[kind] = largest[kind].max(if radius > 0.0 { off / radius } else { 0.0 });

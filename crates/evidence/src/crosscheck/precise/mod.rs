@@ -34,7 +34,7 @@ struct SampledModel {
 }
 
 /// Samples of a scheme over dwells, computed at each precision when requested.
-pub(super) struct Samples<'a, const DIGITS: usize> {
+pub(super) struct PreciseSamples<'a, const DIGITS: usize> {
     scheme: &'a Scheme,
     /// Dwells of the first position, in 1/w_ie.
     dwells: Vec<f64>,
@@ -42,7 +42,7 @@ pub(super) struct Samples<'a, const DIGITS: usize> {
     taken: [OnceLock<Option<SampledModel>>; DIGITS],
 }
 
-impl<'a, const DIGITS: usize> Samples<'a, DIGITS> {
+impl<'a, const DIGITS: usize> PreciseSamples<'a, DIGITS> {
     /// Samples of which none is computed yet.
     pub(super) fn new(scheme: &'a Scheme, dwells: Vec<f64>, bits: [usize; DIGITS]) -> Self {
         Self { scheme, dwells, bits, taken: [const { OnceLock::new() }; DIGITS] }
