@@ -14,7 +14,8 @@ Options have the names of the command line in snake case. Answers have the attri
 JSON (without the symbolic engine), which they return byte for byte. Angles and latitudes are exact: an
 ``int`` and a ``str`` as they are, a ``float`` by its shortest text. A computed number (``0.1 + 0.2``) is
 rounded to nine decimals, and the answer lists it (``answer.rounded``). An invalid request raises a
-:class:`ProblemError`, which is a ``ValueError`` with ``message``, ``file``, ``line`` and ``column``.
+``ValueError`` or ``TypeError``; that of the engine is a :class:`ProblemError`, a ``ValueError`` with
+``message``, ``file``, ``line`` and ``column``.
 """
 
 from __future__ import annotations

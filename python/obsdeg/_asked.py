@@ -44,6 +44,8 @@ def plain(value: Any) -> Any:
         return str(value)
     if isinstance(value, range):
         return list(value)
+    if hasattr(value, "isoformat"):
+        return value.isoformat()
     if hasattr(value, "tolist"):
         # arrays and numbers of numpy
         return value.tolist()
@@ -63,26 +65,26 @@ def written(options: Any) -> str:
     return _WRITER.encode(options)
 
 
-def checked(task: Any, number: int, reserved: Container[str]) -> tuple[dict[str, Any], str]:
+def checked(task: Any, number: int, reserved: Container[str], taken: Container[str]) -> tuple[dict[str, Any], str]:
     """The task as a dict and as JSON text, checked so that a folder can store it: names of options and tags,
-    and text that can be written.
+    and text that can be written. No option has a `reserved` name, no tag a `taken` one.
 
     Raises:
         ValueError: the task is invalid; the message gives its number.
         TypeError: JSON cannot represent the value.
     """
     if not isinstance(task, Mapping):
-        raise ValueError(f"task number {number}: found {_short(task)}; expected a mapping of options by name")
+        raise ValueError(f"task number {number}: found {short(task)}; expected a mapping of options by name")
     for name in task:
         if not isinstance(name, str) or name in reserved:
-            raise ValueError(f"task number {number}: found the option {_short(name)}; expected the name of an option")
+            raise ValueError(f"task number {number}: found the option {short(name)}; expected the name of an option")
     tags = task.get("tags")
     if tags is not None and not isinstance(tags, Mapping):
-        raise ValueError(f"task number {number}: found the tags {_short(tags)}; expected values by name")
+        raise ValueError(f"task number {number}: found the tags {short(tags)}; expected values by name")
     for name in tags or ():
-        if not isinstance(name, str) or name in reserved or name in task:
+        if not isinstance(name, str) or name in taken or name in task:
             expected = "a name of its own, since an option or a column of results has this one"
-            raise ValueError(f"task number {number}: found the tag {_short(name)}; expected {expected}")
+            raise ValueError(f"task number {number}: found the tag {short(name)}; expected {expected}")
     try:
         text = written(task)
         held = json.loads(text)
@@ -98,10 +100,10 @@ def checked(task: Any, number: int, reserved: Container[str]) -> tuple[dict[str,
 
 def stand_in(task: Any, number: int) -> dict[str, Any]:
     """Record that a folder stores in place of a task that cannot be stored."""
-    return {"number": number, "found": _short(task)}
+    return {"number": number, "found": short(task)}
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
     """Text of a value, at most 200 ASCII characters."""
     try:
         text = ascii(value)

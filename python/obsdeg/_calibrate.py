@@ -85,7 +85,8 @@ def calibrate(
         Files (CSV, Parquet), streams of CSV, frames of pandas, polars, pyarrow and others with the C
         interface of Arrow, or columns by name. Columns have the names of files: ``t [s]``, ``position``, ``fx
         [g]``, ``fy [g]``, ``fz [g]``; for a model ``t`` in its unit and the outputs. A time index of pandas
-        is used as the time. Dates count from 1970 in UTC.
+        is used as the time. Dates count from 1970 in UTC. A time that is not that of the run (its first position
+        begins at 0 s) leaves the start of the record open: it is estimated too, and sigmas grow.
     t : array, optional
         Times of a record of arrays: numbers in s (for a model in its unit), dates, or time spans.
     f : array of shape (n, 3), frame of three columns, or mapping, optional

@@ -140,7 +140,10 @@ class Text:
             _obsdeg.calibrate(as_json({"sources": [self._source()]}), [("check", b"x\n1\n")])
         except _obsdeg.ProblemError as problem:
             # other messages concern records, or schemes and models without numbers
-            if problem.file is not None or problem.message.startswith(self.name):
+            if "in discrete time; expected a model in continuous time" in problem.message:
+                # it has no records
+                _obsdeg.answer("analyze", as_json({"sources": [self._source()], "solutions": False, "order": 0}))
+            elif problem.file is not None or problem.message.startswith(self.name):
                 raise
         return self
 

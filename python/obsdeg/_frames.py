@@ -24,6 +24,8 @@ def record(given: Any, place: int) -> Given:
         ImportError: pyarrow, which reads frames of other libraries, is not installed.
     """
     name = f"record {place}"
+    if isinstance(given, str) and "\n" in given:
+        raise ValueError(f"{name}: found a text of {len(given.splitlines())} lines; expected a path, or io.StringIO of the text")
     if isinstance(given, (str, os.PathLike)):
         return os.fspath(given), None
     if callable(getattr(given, "read", None)):

@@ -89,6 +89,10 @@ FOUND = {
 COLUMNS = frozenset(("task", *FOUND))
 
 
+#: Names that a tag cannot have.
+TAKEN = COLUMNS | Analyze.__optional_keys__ | Simulate.__optional_keys__
+
+
 def row_of(task: Mapping[str, Any], error: BaseException) -> dict[str, Any]:
     """Row of a task without an answer."""
     return {**_options(task), **dict.fromkeys(FOUND), "error": said(error)}

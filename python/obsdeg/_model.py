@@ -217,6 +217,8 @@ def _of_sympy(name: str, parts: Mapping[str, Any], keys: Mapping[str, Any]) -> s
     from .importers.system import to_toml
 
     given = {key: value for key, value in parts.items() if value is not None}
+    if "algebraic" in keys:
+        raise ImportProblem("algebraic equations beside expressions of SymPy", "all formulas as texts")
     if "definitions" in given:
         raise ImportProblem("definitions beside expressions of SymPy", "expressions with them put in")
     rates, outputs = given.pop("states", {}), given.pop("outputs", {})
@@ -251,11 +253,11 @@ def _written(name: str, parts: Mapping[str, Any], keys: Mapping[str, Any]) -> st
 def _others(data: Mapping[str, Any]) -> list[str]:
     """Parameters: names in formulas without another meaning, in order of appearance."""
     formulas: list[str] = []
-    for table in ("states", "definitions", "outputs", "constants"):
+    for table in ("states", "algebraic", "definitions", "outputs", "constants"):
         for value in data.get(table, {}).values():
             entries = [value.get(key, "") for key in ("equation", "initial", "expression")] if isinstance(value, Mapping) else [value]
             formulas += [text for text in entries if isinstance(text, str) and text not in ("known", "generic")]
-    groups = ("states", "known_inputs", "unknown_inputs", "constants", "definitions")
+    groups = ("states", "algebraic", "known_inputs", "unknown_inputs", "constants", "definitions")
     known = {"t", "pi", "deg", *(str(name).partition("[")[0] for group in groups for name in data.get(group, ()))}
     names = (found[1] for text in formulas for found in _NAME.finditer(text))
     return [name for name in dict.fromkeys(names) if name not in known]

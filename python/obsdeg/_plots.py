@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from ._files import check_package
@@ -73,7 +74,8 @@ def _dots(axes: Axes, labels: Sequence[str], groups: Sequence[_Group], x: str) -
     axes.set_ylim(len(labels) - 0.4, -0.6)
     if drawn:
         axes.set_xscale("log")
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False, fontsize="small")
+        longest = max(len(group[0]) for group in groups)
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=max(1, min(4, 70 // longest)), frameon=False, fontsize="small")
     if len(labels) <= _NAMES:
         axes.set_yticks(list(places), labels)
     axes.tick_params(labelsize="small")
@@ -139,7 +141,7 @@ def comparison(of: _results.Comparison, canvas: Canvas) -> list[Axes]:
     groups: list[_Group] = []
     for i, (scheme, table) in enumerate(zip(schemes, tables, strict=True)):
         sigmas = [table[n]["sigma"] if n in table and table[n]["status"] == "observable" else None for n in names]
-        groups.append((scheme["name"], sigmas, "os^vDP*"[i % 7], f"C{i}", True))
+        groups.append((_short(scheme["name"]), sigmas, "os^vDP*"[i % 7], f"C{i}", True))
     required = [next((t[n]["requirement"] for t in tables if n in t and t[n].get("requirement")), None) for n in names]
     groups.append(("required", required, "|", "tab:red", True))
     axes = canvas.subplots()
@@ -241,21 +243,23 @@ def _estimates(axes: Axes, rows: list[dict[str, Any]]) -> None:
 def crosscheck(of: _results.CrossCheck, canvas: Canvas) -> list[Axes]:
     """Draws sigma against the dwell, by accuracy order."""
     axes = canvas.subplots()
-    seen: set[Any] = set()
+    curves: dict[Any, list[Any]] = {}
     for curve in of.to_dict()["slopes"]:
-        order = curve["accuracy_order"]
-        points = [(x, y) for x, y in curve["points"] if y > 0]
-        if not points:
-            continue
-        label = "not observable" if order is None else f"accuracy order {order}"
+        if any(y > 0 for _, y in curve["points"]):
+            curves.setdefault(curve["accuracy_order"], []).append(curve)
+    for order, some in curves.items():
         style = {"color": "0.7", "linestyle": "--"} if order is None else {"color": f"C{order}"}
-        axes.loglog(*zip(*points, strict=True), **style, linewidth=1, label=None if order in seen else label)
-        seen.add(order)
+        title = "not observable" if order is None else f"accuracy order {order}"
+        label: str | None = "\n".join(wrap(f"{title}: {', '.join(curve['name'] for curve in some)}", 34))
+        for curve in some:
+            points = [(x, y) for x, y in curve["points"] if y > 0]
+            axes.loglog(*zip(*points, strict=True), **style, linewidth=1, label=label)
+            label = None
     axes.set_xlabel("dwell of a position [s]")
     axes.set_ylabel("sigma [unit of the unknown]")
     axes.set_title("Slope of sigma: minus accuracy order minus one half", fontsize="medium")
-    if seen:
-        axes.legend(fontsize="small")
+    if curves:
+        axes.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     axes.grid(alpha=0.3)
     return [axes]
 
@@ -279,46 +283,79 @@ def system_evidence(of: _results.SystemEvidence, canvas: Canvas) -> list[Axes]:
 
 #: Degrees with a colour of their own in the picture of a sweep; larger ones have the last colour.
 _DEGREES = 8
+#: Colours of cells without a degree, by what they mean.
+_CELLS = {"not observable": "white", "no such unknown": "0.88", "error": "mistyrose"}
+_STYLES = ("-", "--", ":", "-.")
 
 
 def sweep(rows: pandas.DataFrame, x: str, canvas: Canvas) -> list[Axes]:
-    """Draws the degree of every unknown along a tag or option of a sweep and, if there are sigmas, these below."""
+    """Draws the degree of every unknown along a tag or option of a sweep, one column per task, and the sigmas of
+    observable unknowns of simulated runs below."""
     from matplotlib import colormaps
-    from matplotlib.colors import BoundaryNorm
+    from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    judged = rows[rows["name"].notna()]
-    degrees = judged.pivot(index="name", columns=x, values="degree").reindex(judged["name"].unique())
-    if judged[x].dtype.kind not in "iufb":
-        degrees = degrees[judged[x].unique()]
-    grid = degrees.astype("float64").to_numpy()
-    places = range(len(degrees.columns))
-    runs = "sigma" in rows
+    values = rows[x].drop_duplicates()
+    if values.dtype.kind in "iuf":
+        values = values.sort_values()
+    place = {str(v): i for i, v in enumerate(values)}
+    names = list(rows["name"].dropna().unique())
+    faces: list[Any] = [*(colormaps["viridis_r"](d / (_DEGREES - 1)) for d in range(_DEGREES)), *_CELLS.values()]
+    other = {what: _DEGREES + i for i, what in enumerate(_CELLS)}
+    grid = [[other["no such unknown"]] * len(place) for _ in names]
+    for row in rows.to_dict("records"):
+        column = place[str(row[x])]
+        if isinstance(row.get("error"), str):
+            for line in grid:
+                line[column] = other["error"]
+        elif isinstance(row["name"], str):
+            degree = row["degree"]
+            known = degree == degree and degree is not None and str(degree) != "<NA>"
+            grid[names.index(row["name"])][column] = min(int(degree), _DEGREES - 1) if known else other["not observable"]
+    runs = "sigma" in rows and rows["sigma"].notna().any()
     panels = _panels(canvas, 1 + runs, height_ratios=[1, 0.8] if runs else [1])
-    shades = colormaps["viridis_r"].resampled(_DEGREES)
-    panels[0].imshow(grid.clip(max=_DEGREES - 1), aspect="auto", interpolation="nearest", cmap=shades, norm=BoundaryNorm(range(_DEGREES + 1), _DEGREES))
-    if len(degrees) <= _NAMES:
-        panels[0].set_yticks(range(len(degrees)), list(degrees.index), fontsize="small")
-    step = -(-len(places) // 12)
-    panels[0].set_xticks(places[::step], [_short(v) for v in degrees.columns[::step]], fontsize="small")
-    found = sorted({int(d) for d in grid[grid == grid].clip(max=_DEGREES - 1)})
-    label = [f"{d} or more" if d == _DEGREES - 1 else str(d) for d in found]
-    patches = [Patch(facecolor=shades(d), label=text) for d, text in zip(found, label, strict=True)]
-    patches.append(Patch(facecolor="white", edgecolor="0.7", label="not observable"))
-    panels[0].legend(handles=patches, title="observable degree", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(patches), frameon=False, fontsize="small")
-    panels[0].set_xlabel(x)
+    if names:
+        panels[0].imshow(grid, aspect="auto", interpolation="nearest", cmap=ListedColormap(faces), vmin=-0.5, vmax=len(faces) - 0.5)
+    if len(names) <= _NAMES:
+        panels[0].set_yticks(range(len(names)), names, fontsize="small")
+    found = sorted({cell for line in grid for cell in line})
+    label = {_DEGREES - 1: f"{_DEGREES - 1} or more", **{number: what for what, number in other.items()}}
+    patches = [Patch(facecolor=faces[d], edgecolor="0.7", label=label.get(d, str(d))) for d in found]
+    if patches:
+        panels[0].legend(handles=patches, title="observable degree", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=6, frameon=False, fontsize="small")
     if runs:
-        for i, (name, of) in enumerate(judged.dropna(subset=["sigma"]).groupby("name", sort=False)):
-            along = of.sort_values(x)
-            unit = f" [{of['unit'].iloc[0]}]" if of["unit"].iloc[0] else ""
-            panels[1].plot(along[x], along["sigma"], marker="o", markersize=3, linestyle=("-", "--", ":")[i // 10 % 3], label=f"{name}{unit}")
-        panels[1].set_yscale("log")
-        panels[1].set_xlabel(x)
-        panels[1].set_ylabel("sigma at the end of the run")
-        panels[1].legend(fontsize="x-small", ncols=2, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-        panels[1].grid(alpha=0.3)
+        _sigmas(panels[1], rows[rows["degree"].notna()], x, place)
+    for axes in panels:
+        _task_axis(axes, x, [_short(v) for v in values])
     return panels
 
 
+def _sigmas(axes: Axes, rows: pandas.DataFrame, x: str, place: dict[str, int]) -> None:
+    for i, (name, of) in enumerate(rows.groupby("name", sort=False)):
+        along: list[float] = [float("nan")] * len(place)
+        for row in of.to_dict("records"):
+            along[place[str(row[x])]] = row["sigma"]
+        unit = next((u for u in of["unit"] if isinstance(u, str) and u), "")
+        style: dict[str, Any] = {"linestyle": _STYLES[i // 10 % len(_STYLES)], "marker": "os^v"[i // 40 % 4], "color": f"C{i % 10}"}
+        axes.plot(range(len(place)), along, markersize=3, **style, label=f"{name} [{unit}]" if unit else name)
+    axes.set_yscale("log")
+    axes.set_ylabel("sigma at the end of the run")
+    axes.legend(fontsize="x-small", ncols=1 + len(axes.lines) // 16, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.grid(alpha=0.3)
+
+
+def _task_axis(axes: Axes, x: str, labels: list[str]) -> None:
+    """One place per task, with as many labels as fit."""
+    longest = max(map(len, labels), default=1)
+    step = -(-len(labels) // (12 if longest > 6 else 20))
+    slanted: dict[str, Any] = {"rotation": 45, "ha": "right", "rotation_mode": "anchor"} if longest * len(labels[::step]) > 60 else {}
+    axes.set_xticks(range(0, len(labels), step), labels[::step], fontsize="small", **slanted)
+    axes.set_xlim(-0.5, max(len(labels), 1) - 0.5)
+    axes.set_xlabel(x)
+
+
 def _short(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    if value is None or value != value:
+        return "not stated"
+    text = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= 24 else f"{text[:11]}...{text[-10:]}"

@@ -77,6 +77,18 @@ READ: dict[str, Callable[[Any], Any]] = {
 _EXACT = ("latitude", "filter_latitude")
 
 
+def _read(name: str, value: Any) -> Any:
+    """Value of an option; errors name it."""
+    try:
+        return READ.get(name, plain)(value)
+    except (TypeError, ValueError, AttributeError) as error:
+        text = str(error)
+        if not text.startswith("found "):
+            text = f"found {value!r} of type {type(value).__name__}; expected {'a text, or a list of texts' if name in READ else 'a number'}"
+        kind = ValueError if isinstance(error, ValueError) else TypeError
+        raise kind(f"{name}: {text}") from None
+
+
 def request(options: Mapping[str, Any], digits: int | None = DIGITS, log: list[Rounded] | None = None, **files: Any) -> str:
     """Request in JSON.
 
@@ -97,11 +109,14 @@ def request(options: Mapping[str, Any], digits: int | None = DIGITS, log: list[R
         elif name == "angles":
             asked[name] = attitudes(value, digits, log)
         elif name in _EXACT:
-            text = asked[name] = exact(value, digits)
+            try:
+                text = asked[name] = exact(value, digits)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{name}: {error}") from None
             if log is not None and changed(value, text):
                 log.append(Rounded(name, str(value), text))
         else:
-            asked[name] = READ.get(name, plain)(value)
+            asked[name] = _read(name, value)
     for name, value in files.items():
         if value:
             asked[name] = value
@@ -140,4 +155,12 @@ def sources(what: Iterable[Judged], digits: int | None, log: list[Rounded]) -> l
     several = list(what)
     if len(several) == 1:
         return [source(several[0], digits, log)]
-    return [source(w, digits, log, f"scheme {i}") for i, w in enumerate(several, 1)]
+    logs: list[list[Rounded]] = [[] for _ in several]
+    found = [source(w, digits, own, f"scheme {i}") for i, (w, own) in enumerate(zip(several, logs, strict=True), 1)]
+    names = [of["name"] for of in found]
+    for i, (of, own) in enumerate(zip(found, logs, strict=True), 1):
+        if names.count(of["name"]) > 1 and isinstance(several[i - 1], Text):
+            # objects without a name of their own
+            of["name"] = f"{of['name'].removesuffix('.toml')} {i}"
+        log.extend(r._replace(name=f"{r.name} of {of['name']}") for r in own)
+    return found

@@ -463,7 +463,9 @@ class Judgements(Answer):
             asked = json.loads(request)
             # a single request only for what the common JSON does not contain
             part = (command, json.dumps({**asked, "sources": [asked["sources"][i]]}), None)
-        judgement = KINDS[one["answer"]["schema"]](None, part)
+        of = f" of {one['file']}"
+        rounded = tuple(r._replace(name=r.name.removesuffix(of)) for r in self._rounded if r.name.endswith(of))
+        judgement = KINDS[one["answer"]["schema"]](None, part, rounded)
         if part is None:
             judgement._json = json.dumps(one["answer"])
         judgement._data = one["answer"]
@@ -556,6 +558,8 @@ class Design(Drawn, shapes.Design):
         return _drawn(self, "front.svg", "positions.svg")
 
     def _draw(self, figure: Figure | SubFigure) -> list[Axes]:
+        if not self._dict()["found"]:
+            raise LookupError("no scheme was found")
         return _plots.design(self, figure)
 
     def _size(self) -> tuple[float, float]:
@@ -801,6 +805,10 @@ class Report(Answer):
             raise ValueError(f"found {os.fspath(path)!r}; expected a file that ends in .html (`obsdeg report` writes .pdf, .md and .tex)")
         with open(path, "w", encoding="utf-8", newline="") as file:
             file.write(self.html)
+
+    def text(self, format: str = "table") -> str:
+        """HTML of the page."""
+        return self._answer().written(format)
 
     def _summary(self) -> str:
         return f"a page of {len(self.html)} characters"

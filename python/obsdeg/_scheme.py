@@ -87,6 +87,12 @@ class Scheme(Text):
         given = angles if positions is None else positions
         if given is None or (positions is not None and angles is not None):
             raise TypeError(f"found {'no' if given is None else 'both'} positions and angles; expected a list of positions")
+        if "latitude_deg" in keys:
+            if latitude is not None:
+                raise TypeError("found latitude and latitude_deg; expected one of them")
+            latitude = keys.pop("latitude_deg")
+        if "position" in keys:
+            raise TypeError("found position; expected positions, and replace() or a scheme file for other keys of a position")
         check_digits(digits)
         log: list[Rounded] = []
         data: dict[str, Any] = {"name": name or None, "carry": _carry(carry), **keys, "latitude_deg": _latitude(latitude, digits, log)}
@@ -154,7 +160,9 @@ class Scheme(Text):
         data.update(changes)
         data = {key: value for key, value in data.items() if value is not None}
         made = type(self).__new__(type(self))
-        made._make(data, tuple(log) if positions is not None else (*self.rounded, *log), True)
+        replaced = {"latitude": "latitude_deg" in changes}
+        kept = [r for r in self.rounded if not replaced.get(r.name, positions is not None)]
+        made._make(data, (*kept, *log), True)
         return made
 
     @property

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _plots
-from ._asked import checked, stand_in
-from ._judged import COLUMNS, FOUND, WHAT, judged_rows, said
+from ._asked import checked, short
+from ._judged import COLUMNS, FOUND, TAKEN, WHAT, judged_rows, said
 from ._files import check_package
 from ._work import INPUT, Ended
 
@@ -288,9 +288,9 @@ def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, li
     """Rows of some tasks, up to the first with an error unless these are recorded."""
     found: list[tuple[int, list[dict[str, Any]] | Ended]] = []
     for number, given in chunk:
-        asked = _asked(number, stand_in(given, number))
+        asked = _stand_in(number, given)
         try:
-            task, _ = checked(given, number, COLUMNS)
+            task, _ = checked(given, number, COLUMNS, TAKEN)
             asked = _asked(number, task)
             rows = judged_rows(task)
         except INPUT as problem:
@@ -301,13 +301,38 @@ def _judged(chunk: list[tuple[int, Any]], *, record: bool) -> list[tuple[int, li
     return found
 
 
+def _stand_in(number: int, given: Any) -> dict[str, Any]:
+    """Columns of a row for a task that may be invalid: tags and options that a table can hold."""
+    try:
+        asked = _asked(number, given if isinstance(given, Mapping) else {})
+    except Exception:
+        return {"task": number}
+
+    def held(value: Any) -> Any:
+        if value is None or isinstance(value, (bool, int, float)):
+            return value
+        return value.encode("utf-8", "backslashreplace").decode() if isinstance(value, str) else short(value)
+
+    return {str(held(name)): held(value) for name, value in asked.items()}
+
+
 def _asked(number: int, task: Mapping[str, Any]) -> dict[str, Any]:
     """Columns of a row that contain the options of the task."""
-    options = {name: _value(name, value) for name, value in task.items() if name not in (*WHAT, "angles")}
+    options = {name: _value(name, value) for name, value in task.items() if isinstance(name, str) and name not in (*WHAT, "angles", *COLUMNS)}
     given = task.get("tags")
     given = given if isinstance(given, Mapping) else {}
-    tags = {name: value.item() if hasattr(value, "item") else value for name, value in given.items() if name not in COLUMNS}
+    tags = {name: _tag(value) for name, value in given.items() if isinstance(name, str) and name not in COLUMNS}
     return {"task": number, **tags, **options}
+
+
+def _tag(value: Any) -> Any:
+    """Tag as a number or a text."""
+    if hasattr(value, "item"):
+        value = value.item()
+    if hasattr(value, "isoformat"):
+        return value.isoformat()
+    exact = not isinstance(value, (bool, int, float, str)) and hasattr(value, "__float__")
+    return float(value) if exact else value
 
 
 def _value(name: str, value: Any) -> Any:

@@ -139,6 +139,8 @@ def changed(given: Number, taken: str) -> bool:
         return taken != text and Decimal(taken) != Decimal(text)
     if isinstance(given, Decimal):
         return Decimal(taken) != given
+    if getattr(given, "is_Float", False):
+        return changed(float(given), taken)
     found = None if isinstance(given, (int, str)) else _fraction(given)
     if found is None or found[1] == 1:
         return False

@@ -37,7 +37,7 @@ import obsdeg
 from ._asked import checked, digest, key, key_of, stand_in
 from ._executors import Executors, RayExecutor, check_main, processes
 from ._files import place
-from ._judged import COLUMNS, FOUND, WHAT, Chunk, Judged, judge, name_of, parquet, row_of
+from ._judged import COLUMNS, FOUND, TAKEN, WHAT, Chunk, Judged, judge, name_of, parquet, row_of
 from ._judged import done as there_in
 from ._sweeps import plot, read, table, threads, to_xarray
 from ._work import END, INPUT, CampaignError, Ended, Work
@@ -437,7 +437,7 @@ def _sweep(
             error: Exception | None = None
             chunks.drawn += 1
             try:
-                task, text = checked(given, number, COLUMNS)
+                task, text = checked(given, number, COLUMNS, TAKEN)
                 by_value = key_of(text)
             except (TypeError, ValueError) as e:
                 task, error = stand_in(given, number), e

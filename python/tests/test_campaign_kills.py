@@ -245,14 +245,14 @@ def _judged_place(path: Path, text: bytes) -> None:
 
 
 def test_files_grow_with_the_measured_time() -> None:
-    chunks = campaign._Chunks(None)
+    chunks = campaign._Chunks(None, 0)
     sizes = []
     for _ in range(12):
-        sizes.append(chunks.next())
-        chunks.took(0.01 * chunks.next(), chunks.next())
+        sizes.append(chunks.next(1))
+        chunks.took(0.01 * chunks.next(1), chunks.next(1), 1)
     assert sizes[:3] == [1, 4, 16] and sizes[-1] == 1000
-    chunks.took(4000.0, 1000)
-    assert chunks.next() < 10
+    chunks.took(4000.0, 1000, 1)
+    assert chunks.next(1) < 10
 
 
 def test_handed_out_by_the_number_of_workers() -> None:

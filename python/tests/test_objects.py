@@ -240,6 +240,19 @@ def test_where_rounding_is_said() -> None:
     # texts for people say it; JSON and CSV are those of the command line
     assert all(answer.text(of).endswith(f"{said}\n") for of in ("table", "markdown"))
     assert said not in answer.json() + answer.text("csv") + answer.text("latex")
+    # a replaced number is no longer rounded; several schemes say whose it is
+    kept = obsdeg.Scheme([(third, 0, 0)], latitude=60 * third)
+    again = obsdeg.Scheme([(0, 0, 0)], latitude=third)
+    assert [r.name for r in again.replace(latitude=10).rounded] == [] and len(again.replace(positions=[(1, 0, 0)]).rounded) == 1
+    assert [r.name for r in kept.replace(positions=[(1, 0, 0)]).rounded] == []
+    both = obsdeg.analyze(kept, again)
+    assert [r.name for r in both.rounded] == ["alpha of position 1 of scheme 1", "latitude of scheme 2"]
+    assert [[r.name for r in one.rounded] for one in both] == [["alpha of position 1"], ["latitude"]]
+    assert both.names == ["scheme 1", "scheme 2"]
+    compared = obsdeg.compare(kept, again)
+    assert compared["scheme 2"].name == "scheme 2" and "Rounded" not in obsdeg.report(kept).text()
+    sympy = pytest.importorskip("sympy")
+    assert [r.taken for r in obsdeg.Scheme([(sympy.Float(1) / 3, 0, 0)]).rounded] == ["0.333333333"]
     assert pickle.loads(pickle.dumps(answer)).rounded == answer.rounded
     assert obsdeg.analyze([(0.123456, 0, 0)], digits=2, solutions=False).rounded[0].taken == "0.12"
     assert obsdeg.analyze([(2.5, 0, 0), (3.5, 0, 0)], digits=0, solutions=False).rounded[1].taken == "4"

@@ -189,3 +189,42 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(ImportError) as raised:
             call()
         assert str(raised.value) == f"{use} needs the package `pandas`, which is not installed: pip install 'obsdeg[frames]'"
+
+
+def test_options_are_named() -> None:
+    for options, message in (
+        (dict(terms=5), "terms: found 5 of type int; expected a text, or a list of texts"),
+        (dict(latitude=float("nan")), "latitude: found NaN; expected a finite number"),
+        (dict(why=[5, 6]), "why: "),
+    ):
+        with pytest.raises((TypeError, ValueError)) as raised:
+            obsdeg.analyze(PAIR, **options)  # type: ignore[call-overload]
+        assert str(raised.value).startswith(message)
+    scheme = obsdeg.Scheme(PAIR, latitude_deg=90)
+    assert scheme.latitude == 90 and obsdeg.Scheme(PAIR, latitude=90) == scheme
+    with pytest.raises(TypeError, match="latitude and latitude_deg"):
+        obsdeg.Scheme(PAIR, latitude=1, latitude_deg=2)
+    with pytest.raises(TypeError, match="found position; expected positions"):
+        obsdeg.Scheme(PAIR, position=[{}])
+    with pytest.raises(ValueError, match="found a text of 2 lines; expected a path"):
+        obsdeg.calibrate(PAIR, "t [s],fx [g]\n0,1\n")
+    with pytest.raises(LookupError, match="no scheme was found"):
+        obsdeg.design(minimum=True, carry="inertial").plot()
+
+
+def test_algebraic_and_discrete_models_from_parts() -> None:
+    divider = obsdeg.Model(states={"x": "-k*z"}, algebraic={"z": "z - 2*x"}, outputs={"y": "x"})
+    assert divider.parameters == ("k",)
+    assert obsdeg.analyze(divider).statuses == dict.fromkeys(("x", "z", "k"), "observable")
+    for export in (importers.to_si_jl, importers.to_sympy):
+        with pytest.raises(ImportProblem, match="algebraic"):
+            export(divider)
+    import sympy  # type: ignore[import-untyped]
+
+    with pytest.raises(ImportProblem, match="algebraic equations beside expressions of SymPy"):
+        obsdeg.Model(states={"x": sympy.Symbol("k") * sympy.Symbol("z")}, algebraic={"z": "z - x"}, outputs={"y": "x"})
+    daily = obsdeg.Model(states={"x": "a*x"}, outputs={"y": "x"}, discrete=True)
+    assert obsdeg.analyze(daily)["a"].degree == 1
+    assert obsdeg.analyze(daily.replace(outputs={"z": "a"}).check())["a"].degree == 0
+    with pytest.raises(obsdeg.ProblemError, match="nobody"):
+        obsdeg.Model(states={"x": "nobody*x"}, parameters=[], outputs={"y": "x"}, discrete=True)

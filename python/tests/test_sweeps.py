@@ -184,8 +184,8 @@ def test_pictures_of_sweeps() -> None:
     for i, name in enumerate(names):
         for j, x in enumerate((0, 30, 60)):
             degree = one[(one["name"] == name) & (one["x"] == x)]["degree"].item()
-            assert bool(numpy.ma.getmaskarray(grid)[i, j]) == bool(pandas.isna(degree))
-            assert pandas.isna(degree) or grid[i, j] == degree
+            # after eight degrees: not observable, no such unknown, error
+            assert grid[i, j] == (8 if pandas.isna(degree) else degree)
     with pytest.raises(ValueError, match="x: found x, latitude with more than one value; expected the name of one"):
         campaign.plot(rows)
     with pytest.raises(ValueError, match="tasks 0 and 1 with the same x; expected different ones: select rows by latitude"):
@@ -198,10 +198,33 @@ def test_pictures_of_sweeps() -> None:
     runs = campaign.table(dict(scheme=scheme, noise=noise) for noise in (1e-5, 2e-5, 4e-5))
     above, below = campaign.plot(runs)
     assert below.get_xlabel() == above.get_xlabel() == "noise"
+    assert above.get_xlim() == below.get_xlim() == (-0.5, 2.5)
     drawn = {line.get_label(): list(line.get_ydata()) for line in below.get_lines()}
+    assert len(drawn) == runs[runs["degree"].notna()]["name"].nunique()
     own = runs[runs["name"] == "D_FX"]
     assert drawn[f"D_FX [{own['unit'].iloc[0]}]"] == own["sigma"].tolist()
     # texts in the order of the table
     models = [dict(model=obsdeg.Model(states={"x": "-k*x"}, outputs={"y": y}), tags={"seen": y}) for y in ("x", "k*x", "k")]
     (axes,) = campaign.plot(campaign.table(models))
     assert [text.get_text() for text in axes.get_xticklabels()] == ["x", "k*x", "k"]
+    # tasks with an error, and unknowns that a task does not have, are not called unobservable
+    both = [dict(angles=PAIR, latitude=95, tags={"case": "wrong"}), dict(angles=PAIR, tags={"case": "pair"}), dict(model=models[0]["model"], tags={"case": "model"})]
+    (axes,) = campaign.plot(campaign.table(both), "case")
+    cells = numpy.asarray(axes.get_images()[0].get_array())
+    names = [text.get_text() for text in axes.get_yticklabels()]
+    assert (cells[:, 0] == 10).all() and cells[names.index("D_IX"), 2] == cells[names.index("k"), 1] == 9
+    assert [text.get_text() for text in axes.get_legend().get_texts()][-2:] == ["no such unknown", "error"]
+    assert campaign.plot(campaign.table(both[:1]), "case")[0].get_xlabel() == "case"
+
+
+def test_dates_and_exact_numbers_are_tags() -> None:
+    import datetime
+    from fractions import Fraction
+
+    given = [datetime.date(2026, 1, 31), pandas.Timestamp("2026-02-01 12:00"), numpy.datetime64("2026-03-01"), Fraction(1, 4), Decimal("0.5")]
+    rows = campaign.table(dict(angles=PAIR, tags={"x": x}) for x in given)
+    assert rows.groupby("task")["x"].first().tolist() == ["2026-01-31", "2026-02-01T12:00:00", "2026-03-01", 0.25, 0.5]
+    assert "error" not in rows
+    # an option of the commands is no tag, also if the task does not have it
+    (row,) = campaign.table([dict(angles=PAIR, tags={"latitude": 90})]).to_dict("records")
+    assert "found the tag 'latitude'" in row["error"]

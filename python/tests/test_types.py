@@ -3,6 +3,7 @@ examples has its type."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections import defaultdict
@@ -212,7 +213,7 @@ def test_words_of_options_are_those_of_the_commands(option: str) -> None:
         obsdeg._obsdeg.answer(WORDS[option], f'{{"{option}": "no such word"}}')
     hints = get_type_hints(getattr(options, WORDS[option].title()))[option]
     words = {w for k in (get_args(hints) if get_origin(hints) is not Literal else [hints]) for w in get_args(k)}
-    said = set(wrong.value.message.replace("`", " ").replace(",", " ").split())
+    said = set(re.split(r"[\s`,()]+", wrong.value.message))
     assert words and words <= said
 
 

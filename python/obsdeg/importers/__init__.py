@@ -109,6 +109,10 @@ def _own(text: str, path: Path) -> None:
         raise ImportProblem("nothing", "a model or scheme", file=str(path))
 
 
+def __dir__() -> list[str]:
+    return sorted([*__all__, *_LATER])
+
+
 def __getattr__(name: str) -> Any:
     # SymPy is imported when something is read
     if name in _LATER:

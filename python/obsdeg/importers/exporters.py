@@ -39,7 +39,7 @@ def read_model(model: str | Text) -> System:
         file = _toml.loads(text)
     except ValueError as error:
         raise ImportProblem(f"`{error}`", "a model file") from None
-    for key, words in (("experiment", "experiments with values of their own"), ("segment", "segments"), ("constraints", "constraints")):
+    for key, words in (("experiment", "experiments with values of their own"), ("segment", "segments"), ("constraints", "constraints"), ("algebraic", "algebraic equations")):
         if file.get(key):
             raise ImportProblem(words, "one run from a free start", place=f"[{key}]")
     if file.get("experiments", 1) != 1:
