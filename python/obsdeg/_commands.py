@@ -548,7 +548,9 @@ def measure(
     """
     asked: dict[str, Any] = dict(options)
     # an empty text means the candidates of the model
-    asked["measure"] = candidates if isinstance(candidates, str) else ", ".join(candidates or ())
+    if candidates is not None and not isinstance(candidates, Iterable):
+        raise TypeError(f"candidates: found {candidates!r} of type {type(candidates).__name__}; expected a list of outputs")
+    asked["measure"] = candidates if isinstance(candidates, str) else ", ".join(map(str, candidates or ()))
     log: list[Rounded] = []
     given = request({**asked, "own_outputs": own_outputs}, DIGITS, log, conditions_file=source(model, DIGITS, log, "model"))
     answer: Sensors = ask((Sensors,), "design", given, log, progress)
@@ -623,6 +625,8 @@ def next_measurement(
     if days is not None:
         asked["days"] = [float(x) for x in days]
     if after is not None:
+        if not isinstance(after, Answer):
+            raise TypeError(f"after: found {after!r} of type {type(after).__name__}; expected a Calibration")
         files["after"] = {"name": "after", "text": after.json()}
     given = request(asked, digits, log, conditions_file=source(scheme, digits, log, "scheme"), **files)
     answer: NextPositions = ask((NextPositions,), "design", given, log, progress)
@@ -671,6 +675,8 @@ def report(
     >>> page.write("review.html")  # doctest: +SKIP
     """
     log: list[Rounded] = []
+    if calibrations is not None and not isinstance(calibrations, Mapping):
+        raise TypeError(f"calibrations: found {calibrations!r} of type {type(calibrations).__name__}; expected calibrations by name")
     given = [{"name": name, "source": {"name": name, "text": c.json()}} for name, c in (calibrations or {}).items()]
     of = sources(what, digits, log)
     asked = request(options, digits, log, sources=of, calibrations=given, command="obsdeg.report(...) in Python")

@@ -104,16 +104,21 @@ class Text:
         advice = "; `replace` makes a changed copy" if hasattr(self, "replace") else ""
         raise AttributeError(f"{type(self).__name__} does not change: found an assignment to `{name}`{advice}")
 
-    __delattr__ = __setattr__  # type: ignore[assignment]
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"{type(self).__name__} does not change: found a deletion of `{name}`")
 
     @classmethod
     def read(cls, path: Path_) -> Self:
         """Reads a file (TOML; a model may be JSON)."""
+        if not isinstance(path, (str, os.PathLike)):
+            raise TypeError(f"path: found {path!r} of type {type(path).__name__}; expected the path of a file")
         made: Self = cls._of(read_text(path), os.fspath(path))
         return made
 
     @classmethod
     def _of(cls, text: str, name: str, rounded: tuple[Rounded, ...] = ()) -> Any:
+        if not isinstance(text, str):
+            raise TypeError(f"text: found {text!r} of type {type(text).__name__}; expected the text of a file")
         made = cls.__new__(cls)
         made._set(text, name, rounded)
         return made

@@ -9,6 +9,8 @@ from ._results import Progress
 
 def heard(progress: Progress | bool | None) -> tuple[Any, Any]:
     """Function that the engine calls, and the bar to close at the end; ``True`` selects a bar of tqdm."""
+    if progress is not None and not isinstance(progress, bool) and not callable(progress):
+        raise TypeError(f"progress: found {progress!r} of type {type(progress).__name__}; expected a function, or True for a bar")
     if progress is not True:
         return (progress or None), None
     try:

@@ -71,7 +71,12 @@ class Answer:
         >>> obsdeg.Answer.from_json(answer.json()) == answer
         True
         """
-        data = json.loads(text)
+        if not isinstance(text, (str, bytes)):
+            raise TypeError(f"text: found {text!r} of type {type(text).__name__}; expected the JSON of an answer")
+        try:
+            data = json.loads(text)
+        except ValueError as error:
+            raise ValueError(f"found a text that is no JSON ({error}); expected the JSON of an answer") from None
         if isinstance(data, list) and all(isinstance(one, dict) and one.keys() == {"file", "answer"} for one in data):
             kind: type[Answer] = Judgements
         else:
@@ -108,6 +113,9 @@ class Answer:
         if not name.startswith("_"):
             raise AttributeError(f"an answer does not change: found an assignment to `{name}`")
         object.__setattr__(self, name, value)
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"an answer does not change: found a deletion of `{name}`")
 
     @property
     def passed(self) -> bool:
@@ -508,6 +516,9 @@ class Comparison(Drawn, shapes.Comparison):
 
     def __iter__(self) -> Iterator[shapes.Review]:
         return iter(self.schemes)
+
+    def __contains__(self, scheme: object) -> bool:
+        return any(scheme == one["name"] for one in self._dict()["schemes"])
 
     def __len__(self) -> int:
         return len(self._dict()["schemes"])

@@ -185,6 +185,7 @@ def to_xarray(rows: pandas.DataFrame, dims: Sequence[str] | None = None) -> xarr
     {0: 8.0, 30: 12.0}
     """
     check_package("xarray", "a data set")
+    _check_rows(rows)
     import xarray
 
     asked = _options_of(rows)
@@ -249,8 +250,7 @@ def plot(rows: pandas.DataFrame, x: str | None = None, *, figure: Figure | SubFi
     >>> axes[0].get_xlabel()
     'x'
     """
-    if "task" not in rows or "name" not in rows:
-        raise ValueError(f"rows: found the columns {', '.join(map(str, rows.columns))}; expected a table of campaign.table or campaign.read")
+    _check_rows(rows)
     varied = [name for name in _options_of(rows) if rows[name].nunique() > 1]
     if x is None and len(varied) != 1:
         found = ", ".join(varied) if varied else "none"
@@ -265,6 +265,19 @@ def plot(rows: pandas.DataFrame, x: str | None = None, *, figure: Figure | SubFi
         raise ValueError(f"x: found tasks {same} with the same {x}; expected different ones: select rows by {others}")
     height = _plots.height_of(rows["name"].nunique()) + (3.0 if "sigma" in rows else 0.6)
     return _plots.sweep(rows, x, _plots.figure_of(7.0, height) if figure is None else figure)
+
+
+def _check_rows(rows: Any) -> None:
+    """Checks that a table is one of a sweep, with a row at least."""
+    expected = "a table of campaign.table or campaign.read"
+    columns = getattr(rows, "columns", None)
+    if columns is None:
+        raise TypeError(f"rows: found {rows!r} of type {type(rows).__name__}; expected {expected}")
+    if not {"task", "name"} <= set(columns):
+        found = f"the columns {', '.join(map(str, columns))}" if len(columns) else "no columns"
+        raise ValueError(f"rows: found {found}; expected {expected} with a task")
+    if len(rows) == 0:
+        raise ValueError(f"rows: found no row; expected {expected} with a task")
 
 
 def _options_of(rows: pandas.DataFrame) -> list[str]:

@@ -180,10 +180,10 @@ def attitude(angles: Attitude, digits: int | None = DIGITS, place: int = 1, log:
         return angles
     if type(angles) not in (tuple, list):
         if isinstance(angles, (bytes, bytearray, set, frozenset, Mapping)) or not isinstance(angles, Iterable):
-            raise TypeError(f"found the position {angles!r}; expected alpha, beta, gamma in degrees, or letters such as 'NUE'")
+            raise TypeError(f"position {place}: found the position {angles!r}; expected alpha, beta, gamma in degrees, or letters such as 'NUE'")
         angles = list(angles)
     if len(angles) != 3:
-        raise ValueError(f"found {len(angles)} angles in {angles!r}; expected alpha, beta, gamma in degrees")
+        raise ValueError(f"position {place}: found {len(angles)} angles in {angles!r}; expected alpha, beta, gamma in degrees")
     texts = []
     try:
         for x in angles:
@@ -195,7 +195,7 @@ def attitude(angles: Attitude, digits: int | None = DIGITS, place: int = 1, log:
                 log.append(Rounded(f"{('alpha', 'beta', 'gamma')[len(texts)]} of position {place}", str(x), text))
             texts.append(text)
     except (TypeError, ValueError) as e:
-        raise type(e)(f"the position {angles!r}: {e}") from None
+        raise type(e)(f"position {place}, {angles!r}: {e}") from None
     return ",".join(texts)
 
 

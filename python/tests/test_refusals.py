@@ -25,7 +25,7 @@ PAIR = [(0, 0, 0), (180, 0, 0)]
         ((0, 0, 0), "found the position 0; expected alpha"),
         ("NUE", "found 'NUE'; expected a list of positions"),
         ([(0, 0)], "found 2 angles"),
-        ([(0, 0, None)], r"the position \(0, 0, None\): found None"),
+        ([(0, 0, None)], r"position 1, \(0, 0, None\): found None"),
         ([(0, float("nan"), 0)], "expected a finite number"),
     ],
 )
@@ -228,3 +228,29 @@ def test_algebraic_and_discrete_models_from_parts() -> None:
     assert obsdeg.analyze(daily.replace(outputs={"z": "a"}).check())["a"].degree == 0
     with pytest.raises(obsdeg.ProblemError, match="nobody"):
         obsdeg.Model(states={"x": "nobody*x"}, parameters=[], outputs={"y": "x"}, discrete=True)
+
+
+def test_wrong_objects_are_refused_in_words() -> None:
+    answer = obsdeg.analyze(PAIR)
+    scheme = obsdeg.Scheme(PAIR)
+    for call, message in (
+        (lambda: obsdeg.Scheme.from_text(5), "text: found 5 of type int; expected the text of a file"),  # type: ignore[arg-type]
+        (lambda: obsdeg.Scheme.read(5), "path: found 5 of type int; expected the path of a file"),  # type: ignore[arg-type]
+        (lambda: obsdeg.Answer.from_json(None), "text: found None of type NoneType; expected the JSON of an answer"),  # type: ignore[arg-type]
+        (lambda: obsdeg.analyze(PAIR, progress=5), "progress: found 5 of type int; expected a function, or True for a bar"),  # type: ignore[arg-type]
+        (lambda: campaign.plot(5), "rows: found 5 of type int; expected a table"),  # type: ignore[arg-type]
+        (lambda: obsdeg.report(PAIR, calibrations=5), "calibrations: found 5 of type int"),  # type: ignore[call-overload]
+        (lambda: obsdeg.next_measurement(scheme, after=5), "after: found 5 of type int; expected a Calibration"),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(TypeError) as raised:
+            call()
+        assert str(raised.value).startswith(message)
+    with pytest.raises(ValueError, match="found a text that is no JSON"):
+        obsdeg.Answer.from_json("")
+    for of, name in ((scheme, "text"), (answer, "rank")):
+        with pytest.raises(AttributeError, match=f"does not change: found a deletion of `{name}`"):
+            delattr(of, name)
+    with pytest.raises(ValueError, match="name: found 'a b'; expected the name of a variable"):
+        importers.to_si_jl(obsdeg.Model(states={"x": "-k*x"}, outputs={"y": "x"}), name="a b")
+    with pytest.raises(ValueError, match="position 51: found 2 angles"):
+        obsdeg.Scheme([*[(0, 0, 0)] * 50, (0, 0)])  # type: ignore[list-item]

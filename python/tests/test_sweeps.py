@@ -192,7 +192,7 @@ def test_pictures_of_sweeps() -> None:
         campaign.plot(rows, "x")
     with pytest.raises(ValueError, match="x: found 'y'; expected one of x, latitude"):
         campaign.plot(rows, "y")
-    with pytest.raises(ValueError, match="rows: found the columns a; expected a table"):
+    with pytest.raises(ValueError, match="rows: found the columns a; expected a table of campaign"):
         campaign.plot(pandas.DataFrame({"a": [1]}))
     scheme = obsdeg.Scheme(PAIR, carry="inertial", latitude=28.2)
     runs = campaign.table(dict(scheme=scheme, noise=noise) for noise in (1e-5, 2e-5, 4e-5))

@@ -116,6 +116,8 @@ def to_si_jl(model: str | Text | System, *, name: str = "ode") -> str:
         ImportProblem: functions, the time, given starts, unknown inputs, segments or constraints, which the
             macro does not support.
     """
+    if not isinstance(name, str) or not name.isidentifier():
+        raise ValueError(f"name: found {name!r}; expected the name of a variable")
     system = model if isinstance(model, System) else read_model(model)
     _plain(system)
     if system.unknown_inputs:
