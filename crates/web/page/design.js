@@ -7,7 +7,7 @@ const LIMITS = {
 };
 // fields of a search by what its errors say
 const OF_SEARCH = [[/^gimbal|gimbal limit/, 'design-gimbals'], [/^slew_rate|^slews of finite/, 'design-slew-rate'], [/^max_slew/, 'design-max-slew'],
-  [/^max_time/, 'design-max-time'], [/no coefficient of this scheme/, 'design-observable'], [/^criterion|^worst compares/, 'design-criterion'], [/^meet/, 'design-meet']];
+  [/^max_time/, 'design-max-time'], [/no coefficient of this scheme/, 'design-observable'], [/^criterion|^\w+ compares/, 'design-criterion'], [/^meet/, 'design-meet']];
 // words of the page for the options that the engine's texts name
 const OPTIONS = [[/requirement NAME=SIGMA \(.*\), or \[requirements\] in a scheme file/, 'requirements under Positions, such as D = 0.05, psi = 0.01'],
   [/^worst compares/, 'The largest sigma compares'], [/criterion margin \(over requirements\), or D \(their geometric mean\), or observable with/, 'the criterion margin or determinant, or under Must be observable'],

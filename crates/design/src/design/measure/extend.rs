@@ -48,9 +48,13 @@ impl Evaluator {
             return self.add_beside(state, stop.candidate, out);
         }
         let at = (stop.candidate, self.path_to(state.path.last().copied(), stop));
-        match self.locals {
-            PSI_EPS => {
+        match (self.locals, self.n) {
+            (PSI_EPS, 0..=MAX_DRIFTS) => {
                 let local = self.functionals::<PSI_EPS, MAX_DRIFTS>(state, stop);
+                self.extend_beside(state, at, &local, out);
+            }
+            (PSI_EPS, _) => {
+                let local = self.functionals::<PSI_EPS, MAX_UNKNOWNS>(state, stop);
                 self.extend_beside(state, at, &local, out);
             }
             _ => {
@@ -65,8 +69,9 @@ impl Evaluator {
             return self.extend_correlated(bias, state, stop, false, out);
         }
         // sizes known at compile time
-        match self.locals {
-            PSI_EPS => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, beside, out),
+        match (self.locals, self.n) {
+            (PSI_EPS, 0..=MAX_DRIFTS) => self.extend_in::<PSI_EPS, MAX_DRIFTS>(state, stop, beside, out),
+            (PSI_EPS, _) => self.extend_in::<PSI_EPS, MAX_UNKNOWNS>(state, stop, beside, out),
             _ => self.extend_in::<LOCAL, MAX_UNKNOWNS>(state, stop, beside, out),
         }
     }

@@ -6,7 +6,7 @@ pub(crate) const MAX_CANDIDATES: usize = 1000;
 pub(crate) const MAX_TURNING: usize = 256;
 /// Largest number of unknowns of a search: psi and the coefficients of all terms.
 pub(crate) const MAX_UNKNOWNS: usize = 66;
-/// Largest number of unknowns of a search without errors of the accelerometers.
+/// Number of unknowns, psi and drifts, up to which a search takes smaller arrays.
 pub(crate) const MAX_DRIFTS: usize = 33;
 /// Largest number of sequences, up to symmetry, that are searched exhaustively.
 pub const EXHAUSTIVE: u64 = 50_000_000;
