@@ -179,7 +179,7 @@ def test_a_bad_task_is_named_or_recorded(tmp_path: Path) -> None:
         wrong = rows[rows["error"].notna()]
         assert set(wrong["latitude"].dropna()) == {"95"} and wrong["name"].isna().all()
         said = sorted(text[:20] for text in wrong["error"])
-        assert said == ["position 1: found 2 a", "position 1, (0, 0, {1", "latitude: latitude 9"]
+        assert said == ["found {1} of type se", "latitude: latitude 9", "position 1: found 2 "]
     with pytest.raises(ValueError, match="errors: found 'ignore'; expected 'raise' or 'record'"):
         campaign.sweep(tmp_path, [], errors="ignore")  # type: ignore[arg-type]
 
