@@ -128,10 +128,20 @@ impl Browser {
 
     /// Moves the mouse to the middle of an element, and clicks it if `click`.
     pub(crate) fn mouse(&mut self, selector: &str, click: bool) {
-        let place = self.value(&format!(
+        let look = format!(
             "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{block: 'center'}}); \
-             const r = e.getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2]; }})()"
-        ));
+             const r = e.getBoundingClientRect(), x = r.left + r.width / 2, y = r.top + r.height / 2; \
+             return [x, y, e.contains(document.elementFromPoint(x, y))]; }})()"
+        );
+        // late answers move what is below them: the place is taken once it stays, with nothing above it
+        let mut place = self.value(&look);
+        for _ in 0..40 {
+            self.settle();
+            let before = std::mem::replace(&mut place, self.value(&look));
+            if before == place && place[2] == json!(true) {
+                break;
+            }
+        }
         let mut event = |kind: &str, button: &str| {
             let at = json!({ "type": kind, "x": place[0], "y": place[1], "button": button, "clickCount": 1 });
             self.call("Input.dispatchMouseEvent", at);
