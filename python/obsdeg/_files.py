@@ -37,19 +37,6 @@ def place(path: Path, text: bytes) -> None:
         raise
 
 
-def check_package(name: str, use: str, extra: str | None = None) -> None:
-    """Checks that an optional package is installed.
-
-    Raises:
-        ImportError: it is not; the message states what it is needed for and how to install it.
-    """
-    from importlib.util import find_spec
-
-    if find_spec(name) is None:
-        command = f"pip install '{extra}'" if extra else f"pip install {name}"
-        raise ImportError(f"{use} needs the package `{name}`, which is not installed: {command}")
-
-
 #: Largest number of characters of a text, equal to the limit of bytes on the command line.
 TEXT = 50_000_000
 

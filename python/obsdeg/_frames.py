@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ._files import check_package
+from ._packages import check_package
 
 #: Record in the form of the engine: name, and content if it is not a file.
 Given = tuple[str, "bytes | None"]

@@ -12,7 +12,8 @@ from typing import Any
 import obsdeg
 
 from ._asked import digest, key, key_of, written
-from ._files import check_package, place
+from ._files import place
+from ._packages import check_package
 from ._work import INPUT
 from .options import Analyze, Simulate
 

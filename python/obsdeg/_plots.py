@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from ._files import check_package
+from ._packages import check_package
 
 if TYPE_CHECKING:
     import pandas
@@ -291,6 +291,7 @@ _STYLES = ("-", "--", ":", "-.")
 def sweep(rows: pandas.DataFrame, x: str, canvas: Canvas) -> list[Axes]:
     """Draws the degree of every unknown along a tag or option of a sweep, one column per task, and the sigmas of
     observable unknowns of simulated runs below."""
+    import pandas
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
@@ -309,9 +310,8 @@ def sweep(rows: pandas.DataFrame, x: str, canvas: Canvas) -> list[Axes]:
             for line in grid:
                 line[column] = other["error"]
         elif isinstance(row["name"], str):
-            degree = row["degree"]
-            known = degree == degree and degree is not None and str(degree) != "<NA>"
-            grid[names.index(row["name"])][column] = min(int(degree), _DEGREES - 1) if known else other["not observable"]
+            degree = other["not observable"] if pandas.isna(row["degree"]) else min(int(row["degree"]), _DEGREES - 1)
+            grid[names.index(row["name"])][column] = degree
     runs = "sigma" in rows and rows["sigma"].notna().any()
     panels = _panels(canvas, 1 + runs, height_ratios=[1, 0.8] if runs else [1])
     if names:

@@ -160,7 +160,7 @@ def sources(what: Iterable[Judged], digits: int | None, log: list[Rounded]) -> l
     names = [of["name"] for of in found]
     for i, (of, own) in enumerate(zip(found, logs, strict=True), 1):
         if names.count(of["name"]) > 1 and isinstance(several[i - 1], Text):
-            # objects without a name of their own
+            # objects with the same name, such as none of their own
             of["name"] = f"{of['name'].removesuffix('.toml')} {i}"
         log.extend(r._replace(name=f"{r.name} of {of['name']}") for r in own)
     return found

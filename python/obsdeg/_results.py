@@ -10,7 +10,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from . import _obsdeg, _plots, shapes
-from ._files import check_package
+from ._packages import check_package
 from ._records import Record, fields, found, rows
 from ._texts import Rounded
 

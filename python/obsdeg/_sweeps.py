@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from . import _plots
 from ._asked import checked, short
 from ._judged import COLUMNS, FOUND, TAKEN, WHAT, judged_rows, said
-from ._files import check_package
+from ._packages import check_package
 from ._work import INPUT, Ended
 
 if TYPE_CHECKING:
