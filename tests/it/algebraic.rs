@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_core::system::{SystemAnalysis, SystemOptions, analyze_system, model_file};
+use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemOptions, analyze_system, model_file};
 use obsdeg_exact::SplitMix64;
 
 fn analyzed(text: &str) -> SystemAnalysis {
@@ -17,8 +17,31 @@ fn verdicts(text: &str) -> BTreeMap<String, (String, Option<usize>)> {
     a.quantities.iter().map(|q| (q.name.clone(), (q.status.to_string(), q.degree))).collect()
 }
 
-/// Asserts that the unknowns in both models have the same verdicts; at least two are.
+/// Number of solutions by unknown, where it is decided.
+fn numbers(text: &str) -> BTreeMap<String, usize> {
+    let number = |n: NumberOfSolutions| match n {
+        NumberOfSolutions::OneByExpression => Some(1),
+        NumberOfSolutions::Counted(k) => Some(k),
+        NumberOfSolutions::Undecided(_) => None,
+    };
+    let a = analyzed(text);
+    let named = a.quantities.into_iter().map(|q| (q.name, q.number_of_solutions.and_then(number)));
+    named.filter_map(|(name, k)| Some((name, k?))).collect()
+}
+
+/// Asserts that the unknowns in both models have the same verdicts; at least two are in both. Numbers of
+/// solutions are the same where both are decided: that of a model with a known start may not be, as its
+/// eliminated form is proven by being linear.
 fn same(with: &str, by_hand: &str) {
+    let with_numbers = numbers(with);
+    for (name, k) in numbers(by_hand) {
+        let found = with_numbers.get(&name);
+        let may_be_open = by_hand.contains("initial") || !verdicts(with).contains_key(&name);
+        assert!(
+            found == Some(&k) || found.is_none() && may_be_open,
+            "{name} {k} {found:?}: {with}\n{by_hand}"
+        );
+    }
     let (with_verdicts, expected) = (verdicts(with), verdicts(by_hand));
     let both: Vec<&String> = expected.keys().filter(|name| with_verdicts.contains_key(*name)).collect();
     assert!(both.len() > 1, "{with}\n{by_hand}");
@@ -54,6 +77,11 @@ fn eliminated_by_hand() {
     // the first equation does not hold the first unknown
     same(
         &model("", "x = \"i - x\"", "i = \"k - a*x\"\nk = \"i*k - x\"", &["a"], "y = \"x\""),
+        &model("", "x = \"1/a - x\"", "", &["a"], "y = \"x\""),
+    );
+    // the first unknown cancels in the first equation
+    same(
+        &model("", "x = \"i - x\"", "i = \"(a - a)*i + k - a*x\"\nk = \"i*k - x\"", &["a"], "y = \"x\""),
         &model("", "x = \"1/a - x\"", "", &["a"], "y = \"x\""),
     );
     // a known input in an equation, a constant one, and definitions
@@ -221,6 +249,15 @@ fn equations_and_refusals() {
     };
     refused(&one("", "x - p"), "index 1");
     refused(&one("", "0*z - x"), "index 1");
+    refused(&one("", "x + (p - p)*z"), "do not determine `z`");
+    refused(&one("constants = { k = 0 }", "x + k*z"), "do not determine `z`");
+    let two = |i: &str, k: &str| {
+        let equations = format!("i = \"{i}\"\nk = \"{k}\"");
+        model("", "x = \"i - x\"", &equations, &["p"], "y = \"x + k\"")
+    };
+    refused(&two("i + k - x", "2*i + 2*k - 2*x"), "do not determine `k`");
+    // the coefficient of k's rate is zero where the first equation holds
+    refused(&two("i - x", "x + (i - x)*k - p"), "(index 1)");
     refused(
         &model("", "x = \"-z\"", "z = { equation = \"z - x\", initial = \"5\" }", &[], "y = \"x\""),
         "a start",

@@ -3,12 +3,15 @@
 use crate::Field;
 use crate::groebner::{OverLimit, RemainingWork};
 
+/// Number of pivot rows that are subtracted in one pass over a row.
+const BLOCK: usize = 4;
+
 /// Row echelon form of a matrix, columns from left to right: every column is a pivot or depends on pivots
 /// before it.
 #[derive(Debug, Clone)]
 pub struct ColumnEchelon {
     field: Field,
-    /// Rows in echelon form, one per pivot, with a one at their pivots.
+    /// One row per pivot, by pivot, with a one at its pivot and zeros before it.
     rows: Vec<Vec<u64>>,
     pivots: Vec<usize>,
     free: Vec<usize>,
@@ -22,34 +25,65 @@ impl ColumnEchelon {
     pub fn new(
         f: &Field,
         columns: usize,
-        mut rows: Vec<Vec<u64>>,
+        rows: Vec<Vec<u64>>,
         work: &mut RemainingWork,
     ) -> Result<Self, OverLimit> {
-        let (mut pivots, mut free) = (Vec::new(), Vec::new());
-        for column in 0..columns {
-            let top = pivots.len();
-            let Some(found) = (top..rows.len()).find(|&r| rows[r][column] != 0) else {
-                free.push(column);
-                continue;
-            };
-            rows.swap(top, found);
-            let inverse = f.inv(rows[top][column]);
-            rows[top][column..].iter_mut().for_each(|x| *x = f.mul(*x, inverse));
-            let (above, below) = rows.split_at_mut(top + 1);
-            work.take(((below.len() + 1) * (columns - column)) as u64)?;
-            let pivot = &above[top][column..];
-            for row in below {
-                let factor = f.neg(row[column]);
-                if factor != 0 {
-                    for (x, &p) in row[column..].iter_mut().zip(pivot) {
-                        *x = f.add(*x, f.mul(factor, p));
+        let mut out = Self { field: *f, rows: Vec::new(), pivots: Vec::new(), free: Vec::new() };
+        let mut sums: Vec<u128> = Vec::new();
+        for row in rows {
+            if out.rank() == columns {
+                break;
+            }
+            work.take(out.pivots.iter().map(|p| (columns - p) as u64).sum::<u64>() + columns as u64)?;
+            sums.clear();
+            sums.extend(row.iter().map(|&x| f.lazy(f.one(), x)));
+            let mut new = out.reduced(&mut sums);
+            let Some(pivot) = new.iter().position(|&x| x != 0) else { continue };
+            let inverse = f.inv(new[pivot]);
+            new[pivot..].iter_mut().for_each(|x| *x = f.mul(*x, inverse));
+            let place = out.pivots.partition_point(|&p| p < pivot);
+            out.pivots.insert(place, pivot);
+            out.rows.insert(place, new);
+        }
+        out.free = (0..columns).filter(|c| out.pivots.binary_search(c).is_err()).collect();
+        Ok(out)
+    }
+
+    /// The row of the given sums (each of one product) less the multiples of the pivot rows that make it
+    /// zero at all pivots.
+    fn reduced(&self, sums: &mut [u128]) -> Vec<u64> {
+        let f = &self.field;
+        let mut pending = 1;
+        for (rows, pivots) in self.rows.chunks(BLOCK).zip(self.pivots.chunks(BLOCK)) {
+            if pending + BLOCK > Field::MANY {
+                sums[pivots[0]..].iter_mut().for_each(|s| *s = f.settle_many(*s));
+                pending = 0;
+            }
+            // the factor of each row, from the entries at its pivot of the rows before it
+            let mut factors = [0; BLOCK];
+            for (i, &p) in pivots.iter().enumerate() {
+                let before = rows[..i].iter().zip(&factors);
+                let sum = before.fold(sums[p], |sum, (row, &factor)| sum + f.lazy(factor, row[p]));
+                factors[i] = f.neg(f.reduce_many(sum));
+            }
+            let from = pivots[0];
+            let sums = &mut sums[from..];
+            if let [a, b, c, d] = rows {
+                let both = a[from..].iter().zip(&b[from..]).zip(c[from..].iter().zip(&d[from..]));
+                for (s, ((&a, &b), (&c, &d))) in sums.iter_mut().zip(both) {
+                    let first = f.lazy(factors[0], a) + f.lazy(factors[1], b);
+                    *s += first + f.lazy(factors[2], c) + f.lazy(factors[3], d);
+                }
+            } else {
+                for (row, &factor) in rows.iter().zip(&factors) {
+                    for (s, &x) in sums.iter_mut().zip(&row[from..]) {
+                        *s += f.lazy(factor, x);
                     }
                 }
             }
-            pivots.push(column);
+            pending += BLOCK;
         }
-        rows.truncate(pivots.len());
-        Ok(Self { field: *f, rows, pivots, free })
+        sums.iter().map(|&s| f.reduce_many(s)).collect()
     }
 
     /// The rank.

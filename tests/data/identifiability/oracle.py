@@ -4,7 +4,8 @@ A system has two states, one to three parameters and one or two outputs, all pol
 coefficients. At a random point the derivatives of the outputs are numbers. Equating them to these numbers
 gives a system of equations modulo a prime. Its lexicographic basis with an unknown last contains a polynomial
 in this unknown alone. The distinct roots of this polynomial are the values of the unknown. Systems without
-full rank, and those that exceed a time limit, are omitted. `python oracle.py N` writes N systems.
+full rank, and those that exceed a time limit, are omitted. `python oracle.py N` writes N systems;
+`python oracle.py N conserved` writes N to conserved.json whose states have a constant sum (first integral).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ PRIME = 2147483629
 SECONDS = 10
 
 
-def drawn(rng: random.Random) -> dict[str, list[str]]:
+def drawn(rng: random.Random, conserved: bool) -> dict[str, list[str]]:
     parameters = [f"p{i}" for i in range(rng.choice([1, 1, 2, 2, 3]))]
     factors = ["x1", "x2", *parameters]
 
@@ -36,11 +37,10 @@ def drawn(rng: random.Random) -> dict[str, list[str]]:
     outputs = [rng.choice(["x1", "x1^2", "x1*x2", "x1 + x2", "x1^2 + x2", polynomial(2, 2)])]
     if rng.random() < 0.3:
         outputs.append(polynomial(rng.randint(1, 2), 2))
-    return {
-        "parameters": parameters,
-        "rates": [polynomial(rng.randint(1, 3), 2), polynomial(rng.randint(1, 3), 2)],
-        "outputs": outputs,
-    }
+    rates = [polynomial(rng.randint(1, 3), 2), polynomial(rng.randint(1, 3), 2)]
+    if conserved:
+        rates[1] = f"-1*({rates[0]})"
+    return {"parameters": parameters, "rates": rates, "outputs": outputs}
 
 
 def counted(system: dict[str, list[str]], rng: random.Random) -> dict[str, int] | None:
@@ -95,11 +95,12 @@ def ended(*_: object) -> None:
 
 
 def main() -> None:
-    rng = random.Random(38)
+    conserved = "conserved" in sys.argv
+    rng = random.Random(39 if conserved else 38)
     signal.signal(signal.SIGALRM, ended)
     out: list[dict[str, object]] = []
     while len(out) < int(sys.argv[1]):
-        system = drawn(rng)
+        system = drawn(rng, conserved)
         try:
             signal.alarm(SECONDS)
             numbers = counted(system, rng)
@@ -112,7 +113,7 @@ def main() -> None:
             out.append({**system, "numbers": numbers})
             print(len(out), numbers, file=sys.stderr, flush=True)
     lines = ",\n".join(json.dumps(o) for o in out)
-    Path(__file__).with_name("counts.json").write_text(f"[\n{lines}\n]\n")
+    Path(__file__).with_name("conserved.json" if conserved else "counts.json").write_text(f"[\n{lines}\n]\n")
 
 
 main()

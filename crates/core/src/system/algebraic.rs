@@ -1,13 +1,16 @@
 //! Algebraic equations `0 = g(x, z, u)` of index 1: each unknown z becomes a state whose equation follows by
 //! differentiation, `dg/dz z' = -dg/dx x' - dg/du u'`, and the equations become constraints of the start.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
+
+use obsdeg_exact::{Field, SplitMix64};
 
 use super::error::ModelError;
 use super::model::{
     AlgebraicEquation, Constant, KnownInput, Named, PlacedExpression, Role, State, StateStart, SystemModel,
 };
-use crate::language::{Expression, Node};
+use crate::language::{Environment, Expression, Node, evaluate};
 
 /// Name of a derived quantity: its third index tells it from all names of a file.
 fn derived(name: &str, index: usize) -> String {
@@ -111,6 +114,44 @@ fn whole(n: i32) -> Node {
 fn expression(nodes: Vec<Node>, length: usize) -> Expression {
     let spans = vec![0..length; nodes.len()];
     Expression { nodes, spans }
+}
+
+/// Prime of the field in which entries are tested for zero.
+const PRIME: u64 = (1 << 60) + 33;
+
+/// Random values of all names without a definition or given value, and the values that follow.
+struct RandomPoint<'a> {
+    model: &'a SystemModel,
+    f: Field,
+    /// `None` for a definition that has no value here: a function, or a division by zero.
+    known: RefCell<HashMap<String, Option<u64>>>,
+}
+
+impl Environment for RandomPoint<'_> {
+    fn name(&self, name: &str) -> Option<u64> {
+        if let Some(&value) = self.known.borrow().get(name) {
+            return value;
+        }
+        let definition = self.model.definitions.iter().find(|d| d.0 == name).map(|d| &d.1);
+        let given = self.model.constants.iter().find_map(|(named, value)| match value {
+            Constant::Value(of) if named.name == name => Some(of),
+            _ => None,
+        });
+        let value = match definition.or(given) {
+            Some(of) => evaluate(&of.expression, &self.f, self).ok(),
+            None => Some(SplitMix64::of(1, "algebraic equations", &[name]).below(PRIME)),
+        };
+        self.known.borrow_mut().insert(name.into(), value);
+        value
+    }
+
+    fn cos_sin(&self, _: &str) -> Option<(u64, u64)> {
+        None
+    }
+
+    fn known(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// Differentiation of a model by time.
@@ -233,11 +274,18 @@ impl Differentiation<'_> {
         }
     }
 
+    /// True if a definition is zero at a random point.
+    fn is_zero(&self, name: &str) -> bool {
+        let (f, known) = (Field::new(PRIME), RefCell::default());
+        RandomPoint { model: &self.out, f, known }.name(name) == Some(0)
+    }
+
     /// Rates of the algebraic unknowns by elimination in `sum_j J_ij z_j' + r_i = 0`.
     fn solved(&mut self, mut rows: Vec<(PlacedExpression, Rate)>) -> Result<Vec<String>, ModelError> {
         let n = rows.len();
         for j in 0..n {
-            let Some(pivot) = (j..n).find(|&i| rows[i].1[j].is_some()) else {
+            let is_pivot = |i: &usize| rows[*i].1[j].as_ref().is_some_and(|entry| !self.is_zero(entry));
+            let Some(pivot) = (j..n).find(is_pivot) else {
                 let name = &self.model.algebraic[j].named.name;
                 let message = format!(
                     "the algebraic equations do not determine `{name}`; expected index 1 (one of them \

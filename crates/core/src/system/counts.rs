@@ -158,8 +158,10 @@ impl SolutionCounting<'_> {
     fn is_proven(&self) -> bool {
         let Self { compiled, judged, order, .. } = *self;
         // a relation between derivatives that holds on one component of the constraints need not hold on
-        // another
-        let alone = compiled.segments.len() <= 1 && compiled.constraints.is_empty();
+        // another; algebraic equations that are linear in their unknowns have one component where these are
+        // determined
+        let whole = compiled.constraints.is_empty() || compiled.kept_is_graph;
+        let alone = compiled.segments.len() <= 1 && whole;
         let linear = linear_order(self.model, compiled).is_some_and(|last| order >= last);
         alone && (judged.layout.closed || linear)
     }
@@ -192,8 +194,8 @@ impl SolutionCounting<'_> {
         found
     }
 
-    /// Consequences of relations in both fields, if there are any.
-    fn by_relations(&self, limit: u64) -> Option<[RelationConsequences; 2]> {
+    /// Consequences of relations in both fields, if there are any; `single`: unknowns with one value.
+    fn by_relations(&self, limit: u64, single: &[usize]) -> Option<[RelationConsequences; 2]> {
         let Self { model, compiled, judged, seed, fields, .. } = *self;
         let mut found = ModelRelations::default();
         let mut known = |i: usize| -> Option<RelationConsequences> {
@@ -206,8 +208,7 @@ impl SolutionCounting<'_> {
             let system = (model, compiled, judged);
             let known = global::known(
                 system,
-                fields[i],
-                &values,
+                (fields[i], &values, single),
                 &mut found,
                 &mut rng,
                 &mut RemainingWork::new(limit),
@@ -247,8 +248,9 @@ impl SolutionCounting<'_> {
         if !self.is_open(&counts) || limits.relations == 0 || !self.compiled.dag.is_rational() {
             return counts;
         }
+        let single: Vec<usize> = (0..counts.len()).filter(|&l| counts[l] == Ok(1)).collect();
         if global::applies(self.model, self.compiled, self.judged)
-            && let Some([first, second]) = self.by_relations(limits.relations)
+            && let Some([first, second]) = self.by_relations(limits.relations, &single)
         {
             self.again(&mut counts, CountStage::new(others, limits.count), [&first, &second]);
         }

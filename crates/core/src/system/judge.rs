@@ -302,6 +302,13 @@ pub(super) fn singular<S: Values>(
         ),
     };
     match compiled.places.get(&node) {
+        Some((place, span)) if model.algebraic.iter().any(|a| a.equation.place == *place) => {
+            let message = format!(
+                "{message}, on its way to the rate of change of an unknown of [algebraic]; expected equations \
+                 that determine their unknowns at every point that satisfies them (index 1)"
+            );
+            place.error(message, span.clone())
+        }
         Some((place, span)) => place.error(message, span.clone()),
         None => ModelError { what: "the model".into(), message, span: None },
     }

@@ -30,7 +30,7 @@ pub(super) enum NotCounted {
     /// The elimination exceeds its limit of work.
     #[error(
         "the elimination takes more products of coefficients than --count-limit allows; a larger \
-         --count-limit allows more"
+         --count-limit, or relations among output derivatives (--relation-limit 6000), may decide"
     )]
     OverLimit,
     /// The elimination needs a power that it does not form.

@@ -24,6 +24,14 @@ pub(super) struct Jet {
     pub(super) index: usize,
 }
 
+/// States in which a trajectory starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Start {
+    Random,
+    /// The values of the unknowns.
+    Given,
+}
+
 /// A model with chosen values of the quantities that do not change in time (parameters, and states with the
 /// rate zero), and with random states and inputs.
 pub(super) struct JetSource<'a> {
@@ -45,6 +53,9 @@ pub(super) struct JetStructure {
     pub(super) still: Vec<bool>,
     /// Jets of inputs in each output derivative, as `inputs[output][order]`.
     inputs: Vec<Vec<Vec<Jet>>>,
+    /// Derivatives of each output jet by the states that change, as `rows[output][order]`.
+    rows: Vec<Vec<Vec<u64>>>,
+    f: Field,
 }
 
 impl<'a> JetSource<'a> {
@@ -59,13 +70,14 @@ impl<'a> JetSource<'a> {
         Self { f, model, compiled, layout, moving, constants }
     }
 
-    /// Taylor series at random states and inputs; `values` are those of the unknowns, then of the known
-    /// constants. If `lanes`, it has dual components for the states that change and for `orders` jets of
-    /// every input.
+    /// Taylor series at states from `start` and random inputs; `values` are those of the unknowns, then of
+    /// the known constants. With `orders`, it has dual components for the states that change and for as many
+    /// jets of every input.
     fn series(
         &self,
         values: &[u64],
         orders: Option<usize>,
+        start: Start,
         rng: &mut SplitMix64,
     ) -> Option<Taylor<'a, Field>> {
         let (f, unknowns) = (self.f, self.layout.unknowns.len());
@@ -77,7 +89,10 @@ impl<'a> JetSource<'a> {
             signals.push(match *role {
                 Role::State(i) if self.moving.contains(&slot) => {
                     let own = self.moving.iter().position(|&s| s == slot).map(|l| (l, f.one()));
-                    let start = rng.below(f.modulus());
+                    let start = match start {
+                        Start::Random => rng.below(f.modulus()),
+                        Start::Given => values[place?],
+                    };
                     initial[slot] = Some((start, own.filter(|_| orders.is_some()).into_iter().collect()));
                     Signal::State { rate: self.compiled.rates(0)[i] }
                 }
@@ -110,6 +125,11 @@ impl<'a> JetSource<'a> {
         Taylor::new(&self.compiled.dag, f, lanes, signals, &initial, outputs, true, seed, &work).ok()
     }
 
+    /// True if the model has known inputs.
+    pub(super) fn has_inputs(&self) -> bool {
+        self.compiled.roles.iter().any(|r| matches!(r, Role::KnownInput(_)))
+    }
+
     fn node(&self, jet: &Jet) -> Option<usize> {
         match jet.is_output {
             true => self.compiled.outputs(0).get(jet.index).copied(),
@@ -135,7 +155,7 @@ impl<'a> JetSource<'a> {
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let highest = jets.iter().map(|j| j.order).max().unwrap_or(0);
         work.take(self.cost(highest))?;
-        let Some(mut series) = self.series(values, None, rng) else { return Ok(None) };
+        let Some(mut series) = self.series(values, None, Start::Random, rng) else { return Ok(None) };
         while series.length <= highest {
             series.advance();
         }
@@ -147,23 +167,22 @@ impl<'a> JetSource<'a> {
         Ok(jets.iter().map(value).collect())
     }
 
-    /// First `length` Taylor coefficients of jets along one random trajectory; `None` if the series is not
-    /// defined.
+    /// First `length` Taylor coefficients of jets along one trajectory; `None` if the series is not defined.
     ///
     /// # Errors
     /// [`OverLimit`].
     pub(super) fn trajectory(
         &self,
         values: &[u64],
-        jets: &[Jet],
-        length: usize,
+        (jets, length): (&[Jet], usize),
+        start: Start,
         rng: &mut SplitMix64,
         work: &mut RemainingWork,
     ) -> Result<Option<Vec<Vec<u64>>>, OverLimit> {
         let f = self.f;
         let highest = jets.iter().map(|j| j.order).max().unwrap_or(0) + length;
         work.take(self.cost(highest) / 2)?;
-        let Some(mut series) = self.series(values, None, rng) else { return Ok(None) };
+        let Some(mut series) = self.series(values, None, start, rng) else { return Ok(None) };
         while series.length <= highest {
             series.advance();
         }
@@ -182,7 +201,7 @@ impl<'a> JetSource<'a> {
     pub(super) fn structure(&self, values: &[u64], rng: &mut SplitMix64) -> Option<JetStructure> {
         let (f, n) = (self.f, self.moving.len());
         let orders = n + BEYOND + 2;
-        let mut series = self.series(values, Some(orders), rng)?;
+        let mut series = self.series(values, Some(orders), Start::Random, rng)?;
         let outputs = self.compiled.outputs(0);
         let lane_of_input: Vec<usize> = (self.compiled.roles.iter())
             .filter_map(|r| if let Role::KnownInput(i) = *r { Some(i) } else { None })
@@ -192,6 +211,8 @@ impl<'a> JetSource<'a> {
             first_dependent: vec![usize::MAX; outputs.len()],
             still: vec![false; outputs.len()],
             inputs: vec![Vec::new(); outputs.len()],
+            rows: vec![Vec::new(); outputs.len()],
+            f,
         };
         for order in 0..orders {
             while series.length <= order {
@@ -214,6 +235,8 @@ impl<'a> JetSource<'a> {
                 if out.first_dependent[j] == usize::MAX && !space.insert(&row[..n]) {
                     out.first_dependent[j] = order;
                 }
+                row.truncate(n);
+                out.rows[j].push(row);
             }
             let followed = out.first_dependent.iter().all(|&k| k.saturating_add(BEYOND) <= order);
             if followed {
@@ -245,6 +268,22 @@ impl JetStructure {
         }
         out.sort_unstable();
         out.dedup();
-        out
+        self.without_independent(out)
+    }
+
+    /// The jets without those of outputs that are algebraically independent of all others: no relation
+    /// contains them.
+    pub(super) fn without_independent(&self, mut jets: Vec<Jet>) -> Vec<Jet> {
+        let is_chosen = |j: &Jet| j.is_output;
+        let chosen: Vec<Jet> = jets.iter().filter(|j| is_chosen(j)).copied().collect();
+        let columns = self.rows.iter().flatten().next().map_or(0, Vec::len);
+        let rank = |without: Option<&Jet>| {
+            let mut space = Echelon::new(self.f, columns);
+            let others = chosen.iter().filter(|j| Some(*j) != without);
+            others.filter(|j| space.insert(&self.rows[j.index][j.order])).count()
+        };
+        let all = rank(None);
+        jets.retain(|j| !is_chosen(j) || rank(Some(j)) == all);
+        jets
     }
 }

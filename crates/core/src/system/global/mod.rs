@@ -5,12 +5,15 @@
 //! determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output. Ratios of
 //! low degree are interpolated; setting them to their values at the base point gives a system in the
 //! constants alone. A constant with one value among its solutions is unique, whatever other ratios are.
-//! Several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
+//! Where amounts are conserved, one trajectory does not determine the coefficients of the relations that all
+//! have. Then relations are sought along one trajectory; their ratios are functions of the constants and of
+//! the start. Several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
 //! doi:10.1016/0005-1098(94)90029-9; relations by evaluation instead of elimination).
 //!
 //! Constants that a symmetry changes keep their values: the solutions for all others are conjugate over
 //! them.
 
+mod integrals;
 mod jets;
 mod ratios;
 mod relation;
@@ -21,6 +24,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
 use super::judge::Judgement;
 use super::model::{Compiled, SystemModel};
+use integrals::relations_along;
 use jets::JetSource;
 use ratios::{CoefficientRatio, Pool, ratios};
 use relation::{Relation, relations};
@@ -44,9 +48,14 @@ pub(super) struct RelationConsequences {
     pub(super) zero: Vec<Polynomial>,
 }
 
-/// Relations of a model, the same at every point and in every field; `None` before they were sought.
+/// Relations of a model, the same at every point and in every field.
 #[derive(Debug, Default)]
-pub(super) struct ModelRelations(Option<Vec<Relation>>);
+pub(super) struct ModelRelations {
+    /// Relations of all trajectories, and true if others need several; `None` before they were sought.
+    of_all: Option<(Vec<Relation>, bool)>,
+    /// Relations along one trajectory; `None` before they were sought.
+    along: Option<Vec<Relation>>,
+}
 
 /// True if relations among derivatives can decide anything: one experiment and segment, generic starts and
 /// inputs, no function.
@@ -61,33 +70,51 @@ pub(super) fn applies(model: &SystemModel, compiled: &Compiled, judged: &Judgeme
         && judged.fields.is_some()
 }
 
-/// Consequences of relations for the constants at the point `at` (values of the unknowns, then of the known
-/// constants).
+/// Consequences of relations for the unknowns at the point `at` (values of the unknowns, then of the known
+/// constants), given unknowns that are unique.
 pub(super) fn known(
     (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
-    f: Field,
-    at: &[u64],
+    (f, at, single): (Field, &[u64], &[usize]),
     found: &mut ModelRelations,
     rng: &mut SplitMix64,
     work: &mut RemainingWork,
 ) -> RelationConsequences {
     let source = JetSource::new(model, compiled, &judged.layout, f);
     let Some(span) = &judged.span else { return RelationConsequences::default() };
-    let (open, added) = open_constants(span, &source.constants);
-    if found.0.is_none() {
+    let is_observable = |lane: &usize| judged.findings.degrees.degree[*lane].is_some();
+    let ModelRelations { of_all, along } = found;
+    let mut out = RelationConsequences::default();
+    let (relations, several) = of_all.get_or_insert_with(|| {
         let structure = source.structure(at, rng);
-        found.0 = Some(structure.map_or_else(Vec::new, |s| relations(&source, &s, at, rng, work)));
+        structure.map_or_else(Default::default, |s| relations(&source, &s, at, rng, work))
+    });
+    let mut narrow =
+        |lanes: &[usize], relations: &[Relation], work: &mut RemainingWork, rng: &mut SplitMix64| {
+            let lanes: Vec<usize> =
+                lanes.iter().copied().filter(|l| !single.contains(l) && !out.unique.contains(l)).collect();
+            let (open, added) = open_constants(span, &lanes);
+            let mut fibre =
+                ConstantFibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
+            // results found before the work ended are valid
+            let _ended = fibre.narrow(&source, relations, rng, work);
+            let found = fibre.variables.iter().copied().filter(|v| !fibre.open.contains(v));
+            out.unique.extend(found.filter(is_observable));
+            // if additional constants were fixed, the equations hold only together with these
+            if !added {
+                out.zero.extend(fibre.zero());
+            }
+            fibre.open.iter().any(is_observable)
+        };
+    let open = narrow(&source.constants, relations, work, rng);
+    if open && *several && !source.has_inputs() {
+        let relations = along.get_or_insert_with(|| {
+            let structure = source.structure(at, rng);
+            structure.map_or_else(Vec::new, |s| relations_along(&source, &s, at, rng, work))
+        });
+        let all: Vec<usize> = (0..judged.layout.unknowns.len()).collect();
+        narrow(&all, relations, work, rng);
     }
-    let relations = found.0.as_deref().unwrap_or_default();
-    let mut fibre =
-        ConstantFibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
-    // results found before the work ended are valid
-    let _ended = fibre.narrow(&source, relations, rng, work);
-    let is_observable = |lane: usize| judged.findings.degrees.degree[lane].is_some();
-    let unique = fibre.variables.iter().copied().filter(|v| !fibre.open.contains(v) && is_observable(*v));
-    // if additional constants were fixed, the equations hold only together with these
-    let zero = if added { Vec::new() } else { fibre.zero() };
-    RelationConsequences { unique: unique.collect(), zero }
+    out
 }
 
 /// The constants without as many as there are symmetry directions (first those that are no pivots of the

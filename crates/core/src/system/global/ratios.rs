@@ -16,7 +16,7 @@ use super::relation::Relation;
 const DEGREE: usize = 6;
 /// Number of points on a line through all constants, and on one along a constant.
 const LINE: usize = 16;
-const ALONG: usize = 12;
+const ALONG: usize = 8;
 /// Largest number of ratios of a relation that are kept, lowest degrees first.
 const KEPT: usize = 1500;
 /// Number of points that confirm an interpolation, beyond those that determine it.

@@ -7,7 +7,7 @@ use obsdeg_exact::dense::ColumnEchelon;
 use obsdeg_exact::groebner::{OverLimit, RemainingWork};
 use obsdeg_exact::{Field, SplitMix64};
 
-use super::jets::{BEYOND, Jet, JetSource, JetStructure};
+use super::jets::{BEYOND, Jet, JetSource, JetStructure, Start};
 
 /// Largest number of products of jets among which a relation is sought.
 const MONOMIALS: usize = 4000;
@@ -18,22 +18,30 @@ const DEGREE: usize = 8;
 /// Largest number of products among which all relations of all outputs are sought at once.
 const TOGETHER: usize = 400;
 /// Number of points beyond the number of products: a dependency that holds at all of them is a relation.
-const SPARE: usize = 4;
+pub(super) const SPARE: usize = 4;
 
 /// Exponents, one per jet.
-type Exponents = Vec<u8>;
+pub(super) type Exponents = Vec<u8>;
 
 /// Relation `sum_i c_i m_i(jets) = 0`, the only one among its products up to a factor.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Relation {
     jets: Vec<Jet>,
     pub(super) products: Vec<Exponents>,
+    /// Starts of the trajectories that have the relation: any at the same constants, or only the one from
+    /// the given states.
+    start: Start,
 }
 
 /// Degree and weighted degree of a product.
-fn degrees(e: &[u8], weights: &[usize]) -> (usize, usize) {
+pub(super) fn degrees(e: &[u8], weights: &[usize]) -> (usize, usize) {
     let degree = e.iter().map(|&k| usize::from(k)).sum();
     (degree, e.iter().zip(weights).map(|(&k, w)| usize::from(k) * w).sum())
+}
+
+/// Largest weight of a jet in a product.
+pub(super) fn highest(e: &[u8], weights: &[usize]) -> usize {
+    e.iter().zip(weights).filter(|p| *p.0 > 0).map(|p| *p.1).max().unwrap_or(0)
 }
 
 /// Numbers of exponents of degree up to `degree`, one for each largest weighted degree up to `weighted`.
@@ -58,12 +66,12 @@ fn counts(weights: &[usize], degree: usize, weighted: usize) -> Vec<usize> {
 }
 
 /// Number of exponents of a degree and a weighted degree up to a limit.
-fn count(weights: &[usize], degree: usize, weighted: usize) -> usize {
+pub(super) fn count(weights: &[usize], degree: usize, weighted: usize) -> usize {
     counts(weights, degree, weighted)[weighted]
 }
 
 /// All exponents up to a degree and a weighted degree, sorted by degree and then by the last jets.
-fn exponents(weights: &[usize], degree: usize, weighted: usize) -> Vec<Exponents> {
+pub(super) fn exponents(weights: &[usize], degree: usize, weighted: usize) -> Vec<Exponents> {
     let mut out = vec![(Exponents::new(), 0, 0)];
     for &w in weights {
         let longer = out.into_iter().flat_map(|(e, d, s): (Exponents, usize, usize)| {
@@ -124,67 +132,88 @@ impl JetPoints<'_, '_> {
 }
 
 /// Relations at the given constants (values of the unknowns, then of the known constants): one for every
-/// output, or all of a few products if these suffice. Contains what was found when the work ended.
+/// output, or all of a few products if these suffice; true if there are others whose coefficients one
+/// trajectory does not determine. Contains what was found when the work ended.
 pub(super) fn relations(
     source: &JetSource<'_>,
     structure: &JetStructure,
     at: &[u64],
     rng: &mut SplitMix64,
     work: &mut RemainingWork,
-) -> Vec<Relation> {
-    let mut out: Vec<Relation> = Vec::new();
+) -> (Vec<Relation>, bool) {
+    let mut found: Vec<Relation> = Vec::new();
     let outputs = structure.first_dependent.len();
     if outputs > 1 {
         let jets = structure.jets(None, 0);
-        out.extend(together(source, jets, at, rng, work).unwrap_or_default());
+        // those found before the work ended are relations
+        let _ended = together(source, structure, jets, at, &mut found, rng, work);
     }
-    for leader in 0..outputs {
+    let (mut kept, mut several) = (Vec::new(), false);
+    let mut leaders = 0..outputs;
+    loop {
+        found.sort_by_key(|r| r.products.len());
+        for r in found.drain(..).filter(|r| !kept.contains(r)).collect::<Vec<_>>() {
+            match r.determined_by_one_trajectory(source, at, rng, work) {
+                Ok(true) => kept.push(r),
+                Ok(false) => several = true,
+                Err(OverLimit) => {}
+            }
+        }
+        // relations along one trajectory are smaller
+        if several && !source.has_inputs() {
+            break;
+        }
+        let Some(leader) = leaders.next() else { break };
         let order = structure.first_dependent[leader];
-        let leads = |r: &Relation| {
-            let of = |j: &Jet| j.is_output && j.index == leader && j.order >= order;
-            r.jets.iter().any(of)
-        };
-        if !out.iter().any(leads) {
-            out.extend(led_by(source, structure, leader, at, rng, work).ok().flatten());
+        let is_led =
+            |r: &Relation| r.jets.iter().any(|j| j.is_output && j.index == leader && j.order >= order);
+        if !kept.iter().any(is_led) {
+            let half = work.left / 2;
+            let mut share = RemainingWork::new(half);
+            found.extend(led_by(source, structure, leader, at, rng, &mut share).ok().flatten());
+            work.left -= half - share.left;
         }
     }
-    out.sort_by_key(|r| r.products.len());
-    let mut kept: Vec<Relation> = Vec::new();
-    for r in out {
-        if !kept.contains(&r) && r.determined_by_one_trajectory(source, at, rng, work).unwrap_or(false) {
-            kept.push(r);
-        }
-    }
-    kept
+    (kept, several)
 }
 
-/// All relations among products of degree one or two of jets, sorted by the highest derivative in them.
+/// Appends all relations among products of jets of degree one, then of degree two without the jets that the
+/// linear ones give; sorted by the highest derivative in them.
 fn together(
     source: &JetSource<'_>,
-    jets: Vec<Jet>,
+    structure: &JetStructure,
+    mut jets: Vec<Jet>,
     at: &[u64],
+    out: &mut Vec<Relation>,
     rng: &mut SplitMix64,
     work: &mut RemainingWork,
-) -> Result<Vec<Relation>, OverLimit> {
-    let weights: Vec<usize> = jets.iter().map(|j| j.order).collect();
+) -> Result<(), OverLimit> {
     let mut points = JetPoints { source, at, jets: jets.clone(), drawn: Vec::new() };
     for degree in 1..=2 {
+        let weights: Vec<usize> = jets.iter().map(|j| j.order).collect();
         let weighted = degree * weights.iter().max().unwrap_or(&0);
         if count(&weights, degree, weighted) > TOGETHER {
             break;
         }
         let mut products = exponents(&weights, degree, weighted);
-        let highest =
-            |e: &Exponents| e.iter().zip(&weights).filter(|p| *p.0 > 0).map(|p| *p.1).max().unwrap_or(0);
-        products.sort_by_cached_key(|e| (highest(e), degrees(e, &weights)));
+        products.sort_by_cached_key(|e| (highest(e, &weights), degrees(e, &weights)));
         let rows = points.rows(&jets, &products, products.len() + SPARE, rng, work)?;
         let echelon = ColumnEchelon::new(&source.f, products.len(), rows, work)?;
-        if !echelon.free().is_empty() {
-            let relation = |&free: &usize| Relation::of(&jets, &products, &echelon.dependency(free));
-            return Ok(echelon.free().iter().map(relation).collect());
-        }
+        out.extend(
+            echelon
+                .free()
+                .iter()
+                .map(|&c| Relation::of(&jets, &products, &echelon.dependency(c), Start::Random)),
+        );
+        // a jet that a linear relation gives needs no other, and neither do its derivatives
+        let last = |&c: &usize| products[c].iter().position(|&k| k > 0).map(|j| jets[j]);
+        let given: Vec<Jet> = echelon.free().iter().filter_map(last).collect();
+        let follows =
+            |j: &Jet, g: &Jet| (j.is_output, j.index) == (g.is_output, g.index) && j.order >= g.order;
+        jets.retain(|j| !given.iter().any(|g| follows(j, g)));
+        jets = structure.without_independent(jets);
     }
-    Ok(Vec::new())
+    Ok(())
 }
 
 /// Relation with the first dependent derivative of an output, or with up to [`BEYOND`] more; it is sought in
@@ -228,7 +257,12 @@ fn led_by(
             let rows = points.rows(&sets[beyond], &products, size + SPARE, rng, work)?;
             let echelon = ColumnEchelon::new(&source.f, size, rows, work)?;
             if let Some(&free) = echelon.free().first() {
-                return Ok(Some(Relation::of(&sets[beyond], &products, &echelon.dependency(free))));
+                return Ok(Some(Relation::of(
+                    &sets[beyond],
+                    &products,
+                    &echelon.dependency(free),
+                    Start::Random,
+                )));
             }
             failed.push((beyond, degree, weighted));
         }
@@ -239,12 +273,12 @@ fn led_by(
 
 impl Relation {
     /// Relation of the products with a non-zero coefficient, without the jets that occur in none.
-    fn of(jets: &[Jet], products: &[Exponents], coefficients: &[u64]) -> Self {
+    pub(super) fn of(jets: &[Jet], products: &[Exponents], coefficients: &[u64], start: Start) -> Self {
         let own: Vec<&Exponents> =
             products.iter().zip(coefficients).filter(|p| *p.1 != 0).map(|p| p.0).collect();
         let used: Vec<usize> = (0..jets.len()).filter(|&j| own.iter().any(|e| e[j] > 0)).collect();
         let products = own.iter().map(|e| used.iter().map(|&j| e[j]).collect()).collect();
-        Self { jets: used.iter().map(|&j| jets[j]).collect(), products }
+        Self { jets: used.iter().map(|&j| jets[j]).collect(), products, start }
     }
 
     /// Coefficients at the given constants, with a one at the last product; `None` if they are not
@@ -260,8 +294,19 @@ impl Relation {
         work: &mut RemainingWork,
     ) -> Result<Option<Vec<u64>>, OverLimit> {
         let size = self.products.len();
-        let mut points = JetPoints { source, at, jets: self.jets.clone(), drawn: Vec::new() };
-        let rows = points.rows(&self.jets, &self.products, size + 1, rng, work)?;
+        let rows = match self.start {
+            Start::Random => {
+                let mut points = JetPoints { source, at, jets: self.jets.clone(), drawn: Vec::new() };
+                points.rows(&self.jets, &self.products, size + 1, rng, work)?
+            }
+            Start::Given => {
+                let set = (&self.jets[..], &self.products[..]);
+                match along_trajectory(source, at, set, (size + 1, self.start), rng, work)? {
+                    Some(rows) => rows,
+                    None => return Ok(None),
+                }
+            }
+        };
         let echelon = ColumnEchelon::new(&source.f, size, rows, work)?;
         Ok((echelon.free() == [size - 1]).then(|| echelon.dependency(size - 1)))
     }
@@ -276,32 +321,47 @@ impl Relation {
         rng: &mut SplitMix64,
         work: &mut RemainingWork,
     ) -> Result<bool, OverLimit> {
-        let (f, size) = (source.f, self.products.len());
-        let length = size + SPARE;
-        let Some(jets) = source.trajectory(at, &self.jets, length, rng, work)? else { return Ok(false) };
-        let mut one = vec![0; length];
-        one[0] = f.one();
-        let mut known: BTreeMap<Exponents, Vec<u64>> = BTreeMap::from([(vec![0; self.jets.len()], one)]);
-        for product in &self.products {
-            // multiply factor by factor; common beginnings are shared
-            let mut part = vec![0; self.jets.len()];
-            for (j, &power) in product.iter().enumerate() {
-                for _ in 0..power {
-                    let before = part.clone();
-                    part[j] += 1;
-                    if !known.contains_key(&part) {
-                        work.take((length * length / 2) as u64)?;
-                        let a = &known[&before];
-                        let term = |k: usize| f.dot(0, (0..=k).map(|i| (a[i], jets[j][k - i])));
-                        let series: Vec<u64> = (0..length).map(term).collect();
-                        known.insert(part.clone(), series);
-                    }
+        let size = self.products.len();
+        let set = (&self.jets[..], &self.products[..]);
+        let rows = along_trajectory(source, at, set, (size + SPARE, Start::Random), rng, work)?;
+        let Some(rows) = rows else { return Ok(false) };
+        Ok(ColumnEchelon::new(&source.f, size, rows, work)?.rank() == size - 1)
+    }
+}
+
+/// Taylor coefficients of products of jets along one trajectory, one row per order up to `length`; `None` if
+/// the series is not defined.
+pub(super) fn along_trajectory(
+    source: &JetSource<'_>,
+    at: &[u64],
+    (jets, products): (&[Jet], &[Exponents]),
+    (length, start): (usize, Start),
+    rng: &mut SplitMix64,
+    work: &mut RemainingWork,
+) -> Result<Option<Vec<Vec<u64>>>, OverLimit> {
+    let f = source.f;
+    let Some(series) = source.trajectory(at, (jets, length), start, rng, work)? else { return Ok(None) };
+    let mut one = vec![0; length];
+    one[0] = f.one();
+    let mut known: BTreeMap<Exponents, Vec<u64>> = BTreeMap::from([(vec![0; jets.len()], one)]);
+    for product in products {
+        // multiply factor by factor; common beginnings are shared
+        let mut part = vec![0; jets.len()];
+        for (j, &power) in product.iter().enumerate() {
+            for _ in 0..power {
+                let before = part.clone();
+                part[j] += 1;
+                if !known.contains_key(&part) {
+                    work.take((length * length / 2) as u64)?;
+                    let a = &known[&before];
+                    let term = |k: usize| f.dot(0, (0..=k).map(|i| (a[i], series[j][k - i])));
+                    let made: Vec<u64> = (0..length).map(term).collect();
+                    known.insert(part.clone(), made);
                 }
             }
         }
-        let rows = (0..length).map(|k| self.products.iter().map(|p| known[p][k]).collect()).collect();
-        Ok(ColumnEchelon::new(&f, size, rows, work)?.rank() == size - 1)
     }
+    Ok(Some((0..length).map(|k| products.iter().map(|p| known[p][k]).collect()).collect()))
 }
 
 #[cfg(test)]
