@@ -4,14 +4,18 @@
 //! `f = sum_j a_j m_j` is observable at generic points iff its differential vanishes on every unobservable
 //! direction there. This is a linear system for the `a_j` from several random points, modulo a prime.
 //! Rational `a_j` are reconstructed, and the result is verified modulo the other prime. A scaling symmetry
-//! takes `f` to a sum of parts of one weight each, so products of weight zero suffice.
+//! takes `f` to a sum of parts of one weight each, so products of weight zero suffice. What is still missing
+//! is taken from ratios of the coefficients of relations among output derivatives, then from these
+//! derivatives themselves.
 
+use obsdeg_exact::groebner::RemainingWork;
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::error::ModelError;
 use super::functions::gcd;
+use super::global::functions_of_constants;
 use super::judge::{Judgement, PointDegrees, climb_at};
-use super::lie::lie_derivatives;
+use super::lie::{lie_derivatives, terms_of_quotient};
 use super::model::{Compiled, Role, SystemModel};
 use super::quotients::{QuotientPowers, Terms};
 use super::symmetry::{Invariant, Symmetries, integers, rationals};
@@ -19,7 +23,7 @@ use super::work::Spent;
 use crate::degree::sparse::{extend_by_short_vectors, support};
 
 /// Largest number of products of a family; it decides the work.
-const PRODUCTS: usize = 400;
+const PRODUCTS: usize = 800;
 /// Largest number of products that are listed before those with a weight are removed.
 const LISTED: usize = 200_000;
 /// Largest number of points.
@@ -29,8 +33,10 @@ const POINTS: usize = 250;
 const ELSEWHERE: usize = 24;
 /// Limit of operations of all points and eliminations of a search.
 const OPERATIONS: u64 = 200_000_000;
+/// Limit of the work of relations.
+const RELATIONS: u64 = 200_000_000;
 /// Largest number of terms of a function that is kept.
-const TERMS: usize = 12;
+const TERMS: usize = 40;
 /// Highest degree among the unknowns that the functions found before do not express.
 const RESTRICTED: u32 = 4;
 
@@ -99,6 +105,9 @@ pub(super) fn identifiable_functions(
         }
     }
     if search.missing() > 0 {
+        search.of_relations();
+    }
+    if search.missing() > 0 {
         for terms in lie_derivatives(model, compiled, judged, f) {
             search.keep(terms);
         }
@@ -153,6 +162,8 @@ fn families(judged: &Judgement, shown: &[bool]) -> Vec<ProductFamily> {
     vec![
         family(&parameters, 2, false),
         family(&parameters, 3, true),
+        family(&parameters, 4, false),
+        family(&parameters, 5, false),
         family(&moved, 2, false),
         family(&moved, 3, true),
         family(&all, 2, false),
@@ -316,6 +327,18 @@ impl<'a> FunctionSearch<'a> {
             self.keep(places.iter().map(|&j| (numbers[j], products[j].clone())).collect());
         }
         Ok(())
+    }
+
+    /// Adds ratios of the coefficients of relations among output derivatives.
+    fn of_relations(&mut self) {
+        let at = self.first().values.clone();
+        let system = (self.model, self.compiled, self.judged);
+        let work = &mut RemainingWork::new(RELATIONS);
+        for quotient in functions_of_constants(system, (self.f, &at), &mut self.rng, work) {
+            if let Some(terms) = terms_of_quotient(&self.f, &quotient) {
+                self.keep(terms);
+            }
+        }
     }
 
     /// Keeps a function if it is identifiable and independent of those before it.

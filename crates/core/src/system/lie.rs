@@ -111,16 +111,37 @@ fn coefficients(p: &Polynomial, first: u32, f: &Field) -> Vec<Terms> {
         let (of_unknowns, of_inputs): (Vec<_>, Vec<_>) = m.iter().copied().partition(|x| x.0 < first);
         parts.entry(of_inputs).or_default().push((of_unknowns, c));
     }
-    let integers = |terms: Vec<(Monomial, u64)>| -> Option<Terms> {
-        if terms.len() > GIVEN {
-            return None;
+    parts.into_values().filter_map(|terms| with_integers(f, &terms)).collect()
+}
+
+/// Terms with integer coefficients, up to a common factor; `None` if there are many, or some are not
+/// rational.
+fn with_integers(f: &Field, terms: &[(Monomial, u64)]) -> Option<Terms> {
+    if terms.len() > GIVEN {
+        return None;
+    }
+    let lead = f.inv(terms.first()?.1);
+    let numbers: Option<Vec<(i64, i64)>> = terms.iter().map(|t| f.rational(&f.mul(t.1, lead))).collect();
+    let numbers = super::symmetry::integers(&numbers?);
+    let powers = |m: &Monomial| m.iter().map(|&(v, e)| (v as usize, e as i32)).collect();
+    Some(numbers.into_iter().zip(terms).map(|(c, t)| (c, powers(&t.0))).collect())
+}
+
+/// Quotient as terms, or its inverse; `None` if both parts have several terms.
+pub(super) fn terms_of_quotient(f: &Field, [above, below]: &[Polynomial; 2]) -> Option<Terms> {
+    let (sum, one) = if below.len() == 1 { (above, below) } else { (below, above) };
+    let (divisor, _) = one.terms().next().filter(|_| one.len() == 1)?;
+    let terms: Vec<(Monomial, u64)> = sum.terms().map(|(m, c)| (m.clone(), c)).collect();
+    let mut terms = with_integers(f, &terms)?;
+    for (_, powers) in &mut terms {
+        for &(v, e) in divisor {
+            match powers.iter_mut().find(|p| p.0 == v as usize) {
+                Some(own) => own.1 -= e as i32,
+                None => powers.push((v as usize, -(e as i32))),
+            }
         }
-        let lead = f.inv(terms.first()?.1);
-        let rational = |x: u64| f.rational(&f.mul(x, lead));
-        let numbers: Option<Vec<(i64, i64)>> = terms.iter().map(|t| rational(t.1)).collect();
-        let numbers = super::symmetry::integers(&numbers?);
-        let powers = |m: &Monomial| m.iter().map(|&(v, e)| (v as usize, e as i32)).collect();
-        Some(numbers.into_iter().zip(&terms).map(|(c, t)| (c, powers(&t.0))).collect())
-    };
-    parts.into_values().filter_map(integers).collect()
+        powers.retain(|p| p.1 != 0);
+        powers.sort_unstable();
+    }
+    Some(terms)
 }

@@ -32,6 +32,8 @@ use relation::{Relation, relations};
 /// Largest numbers of evaluations of a relation for one ratio, in steps: results of a cheap step make the
 /// next ratios cheaper.
 const EVALUATIONS: [usize; 5] = [30, 100, 300, 700, 1500];
+/// Largest number of evaluations for a ratio that is given as a function.
+const FUNCTION: usize = 700;
 /// Number of ratios at each step beyond those that raise the rank.
 const EXTRAS: usize = 6;
 /// Limit of the work of one Groebner basis in the constants.
@@ -115,6 +117,34 @@ pub(super) fn known(
         narrow(&all, relations, work, rng);
     }
     out
+}
+
+/// Ratios of coefficients of relations, as functions of the constants (numbered as in the layout): numerator
+/// and denominator of each, independent ones of low degree. Contains what was found when the work ended.
+pub(super) fn functions_of_constants(
+    (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
+    (f, at): (Field, &[u64]),
+    rng: &mut SplitMix64,
+    work: &mut RemainingWork,
+) -> Vec<[Polynomial; 2]> {
+    if !applies(model, compiled, judged) {
+        return Vec::new();
+    }
+    let source = JetSource::new(model, compiled, &judged.layout, f);
+    let Some(structure) = source.structure(at, rng) else { return Vec::new() };
+    let (relations, _) = relations(&source, &structure, at, rng, work);
+    let variables = source.constants.clone();
+    let mut all: Vec<CoefficientRatio> = Vec::new();
+    for numbered in relations.iter().enumerate() {
+        all.extend(ratios(&source, numbered, at, &variables, rng, work).unwrap_or_default());
+    }
+    let places: Vec<usize> = (0..variables.len()).collect();
+    all.sort_by_cached_key(|r| r.cost(&places));
+    let mut space = Echelon::new(f, variables.len());
+    all.retain(|r| r.cost(&places) <= FUNCTION && space.insert(&r.gradient));
+    let mut pool = Pool::new(&source, &relations, at, variables);
+    let function = |r: &CoefficientRatio| pool.function(r, &places, rng, work).ok().flatten();
+    all.iter().filter_map(function).collect()
 }
 
 /// The constants without as many as there are symmetry directions (first those that are no pivots of the
