@@ -210,11 +210,12 @@ fn matrices_beyond_the_limits_are_refused() {
 fn solutions_beyond_the_limit_name_their_option() {
     let text = "name = \"m\"\n[states]\nx = \"-a*x^2 + b*y\"\ny = \"a*b*x - c*y\"\n\
                 [parameters]\na = {}\nb = {}\nc = {}\n[outputs]\nz = \"x\"\n";
-    let reason = |limit: &str| {
-        let answer = answered(text, &["--count-limit", limit]).expect("judged");
-        answer.to_string().contains("may decide")
+    let says = |options: &[&str], words: &str| {
+        answered(text, &[&["--count-limit"], options].concat()).expect("judged").to_string().contains(words)
     };
-    assert!(reason("0") && !reason("30"));
+    assert!(says(&["0"], "(--relation-limit 6000), may decide"));
+    assert!(says(&["0", "--relation-limit", "1"], "a larger --count-limit may decide"));
+    assert!(!says(&["30"], "may decide"));
 }
 
 /// Adversarial texts: each is refused, and the message names the exceeded limit.

@@ -333,7 +333,13 @@ pub(super) fn values_taken(
     let twins = counting.confirmed(&mut counts);
     let maps: Vec<String> = twins.iter().map(|t| t.words(compiled, &|role| role_name(model, role))).collect();
     let (maps, of_functions) = counting.of_all(&counts, maps, limits.count);
-    let observable = counts.into_iter().zip(&degrees.degree).map(|(count, degree)| degree.and(Some(count)));
+    let unused = limits.relations == 0 && global::applies(model, compiled, judged);
+    let advised = |count: SolutionCount| match count {
+        Err(NotCounted::OverLimit) if unused => Err(NotCounted::WithoutRelations),
+        count => count,
+    };
+    let observable =
+        counts.into_iter().zip(&degrees.degree).map(|(count, degree)| degree.and(Some(advised(count))));
     let counts: Vec<Option<SolutionCount>> = observable.collect();
     let of_functions = with_single(functions, of_functions, &counts);
     Solutions { counts, of_functions, order, maps }

@@ -30,9 +30,15 @@ pub(super) enum NotCounted {
     /// The elimination exceeds its limit of work.
     #[error(
         "the elimination takes more products of coefficients than --count-limit allows; a larger \
-         --count-limit, or relations among output derivatives (--relation-limit 6000), may decide"
+         --count-limit may decide"
     )]
     OverLimit,
+    /// The elimination exceeds its limit of work, and relations were not sought.
+    #[error(
+        "the elimination takes more products of coefficients than --count-limit allows; a larger \
+         --count-limit, or relations among output derivatives (--relation-limit 6000), may decide"
+    )]
+    WithoutRelations,
     /// The elimination needs a power that it does not form.
     #[error("the elimination would form powers above 255, whatever --count-limit")]
     TooHigh,
