@@ -138,6 +138,22 @@ fn known_starts() {
     }
 }
 
+/// Thirty linear equations, each with all unknowns: all are multiples of p*x, so that all are determined.
+#[test]
+fn many_equations() {
+    let coefficient = |i: usize, j: usize| i * j % 7 + if i == j { 6 } else { 1 };
+    let equation = |i: usize| {
+        let terms: Vec<String> = (1..=30).map(|j| format!("{}*z{j}", coefficient(i, j))).collect();
+        format!("z{i} = \"{} - {i}*p*x\"\n", terms.join(" + "))
+    };
+    let equations: String = (1..=30).map(equation).collect();
+    let verdicts = verdicts(&model("", "x = \"-z1\"", &equations, &["p"], "y = \"x\""));
+    assert_eq!(verdicts.len(), 32);
+    let first_order = |name: &&String| verdicts[*name] == ("observable".into(), Some(1));
+    assert_eq!(verdicts.keys().filter(first_order).count(), 31);
+    assert_eq!(verdicts["x"], ("observable".into(), Some(0)));
+}
+
 /// A quadratic equation, whose solution no rational formula gives: its derivative by hand, with the equation
 /// as a constraint.
 #[test]

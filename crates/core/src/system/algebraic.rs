@@ -122,9 +122,10 @@ const PRIME: u64 = (1 << 60) + 33;
 /// Random values of all names without a definition or given value, and the values that follow.
 struct RandomPoint<'a> {
     model: &'a SystemModel,
-    f: Field,
+    /// Index of every definition, by name.
+    places: &'a HashMap<String, usize>,
     /// `None` for a definition that has no value here: a function, or a division by zero.
-    known: RefCell<HashMap<String, Option<u64>>>,
+    known: &'a RefCell<HashMap<String, Option<u64>>>,
 }
 
 impl Environment for RandomPoint<'_> {
@@ -132,13 +133,13 @@ impl Environment for RandomPoint<'_> {
         if let Some(&value) = self.known.borrow().get(name) {
             return value;
         }
-        let definition = self.model.definitions.iter().find(|d| d.0 == name).map(|d| &d.1);
+        let definition = self.places.get(name).map(|&i| &self.model.definitions[i].1);
         let given = self.model.constants.iter().find_map(|(named, value)| match value {
             Constant::Value(of) if named.name == name => Some(of),
             _ => None,
         });
         let value = match definition.or(given) {
-            Some(of) => evaluate(&of.expression, &self.f, self).ok(),
+            Some(of) => evaluate(&of.expression, &Field::new(PRIME), self).ok(),
             None => Some(SplitMix64::of(1, "algebraic equations", &[name]).below(PRIME)),
         };
         self.known.borrow_mut().insert(name.into(), value);
@@ -162,6 +163,10 @@ struct Differentiation<'a> {
     made: usize,
     /// Rates of names that were differentiated.
     known: HashMap<String, Rate>,
+    /// Index of every definition of `out`, by name.
+    places: HashMap<String, usize>,
+    /// Values at a random point that were needed so far.
+    values: RefCell<HashMap<String, Option<u64>>>,
 }
 
 impl Differentiation<'_> {
@@ -170,6 +175,7 @@ impl Differentiation<'_> {
         let value = PlacedExpression { expression: expression(nodes, of.text.len()), ..of.clone() };
         self.made += 1;
         let name = derived("rate", self.made);
+        self.places.insert(name.clone(), self.out.definitions.len());
         self.out.definitions.push((name.clone(), value));
         name
     }
@@ -276,8 +282,8 @@ impl Differentiation<'_> {
 
     /// True if a definition is zero at a random point.
     fn is_zero(&self, name: &str) -> bool {
-        let (f, known) = (Field::new(PRIME), RefCell::default());
-        RandomPoint { model: &self.out, f, known }.name(name) == Some(0)
+        let Self { out: model, places, values: known, .. } = self;
+        RandomPoint { model, places, known }.name(name) == Some(0)
     }
 
     /// Rates of the algebraic unknowns by elimination in `sum_j J_ij z_j' + r_i = 0`.
@@ -361,7 +367,9 @@ impl SystemModel {
         if self.own.iter().any(|e| !e.known_inputs.is_empty()) {
             return refuse("[[experiment]]", "inputs of its own with algebraic equations; expected none");
         }
-        let mut d = Differentiation { model: &self, out: self.clone(), made: 0, known: HashMap::new() };
+        let places = self.definitions.iter().enumerate().map(|(i, d)| (d.0.clone(), i)).collect();
+        let (known, values) = (HashMap::new(), RefCell::default());
+        let mut d = Differentiation { model: &self, out: self.clone(), made: 0, known, places, values };
         let mut rows = Vec::new();
         for equation in &self.algebraic {
             rows.push((equation.equation.clone(), d.rate_of(&equation.equation)?));
