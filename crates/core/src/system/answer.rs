@@ -7,6 +7,7 @@ use super::branches::{BranchSide, branches};
 use super::constraints::ConstraintFactor;
 use super::counts::{CountLimits, SolutionCount, Solutions, values_taken};
 use super::error::ModelError;
+use super::function_factors::Factors;
 use super::functions::gcd;
 use super::identifiable::{identifiable_functions, terms_of};
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
@@ -332,7 +333,8 @@ pub(super) fn analyzed(model: &SystemModel, options: SystemOptions) -> Result<An
     let mut out = answer(model, &judged, &symmetries);
     out.note = symmetries.stopped.clone();
     let (functions, missing) = identifiable_functions(model, &compiled, &judged, &symmetries, seed)?;
-    let name = |c: usize| name_of(model, &judged, c);
+    let factors = Factors::new(model, &compiled, &judged.layout);
+    let name = |c: usize| factors.name(c, model, &judged.layout);
     out.invariants.extend(functions.iter().map(|f| SystemCombination {
         expression: f.text(&name),
         degree: Some(f.degree),

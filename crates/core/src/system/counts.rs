@@ -6,6 +6,7 @@ use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::{Dag, Op};
 use super::fibre::{CountingPoint, Fibre, at_point};
+use super::function_factors::Factors;
 use super::global::{self, ModelRelations, RelationConsequences};
 use super::judge::Judgement;
 use super::maps::second_solution;
@@ -182,7 +183,7 @@ impl SolutionCounting<'_> {
         if let Ok(point) = point
             && degrees.rank() == layout.unknowns.len()
         {
-            let at = point.values(compiled, layout, 0);
+            let at = point.values(compiled, layout, &[]);
             for (lane, count) in counts.iter_mut().enumerate() {
                 if let Err(NotCounted::NotClosed(k)) = *count
                     && images(&found, compiled, layout, &fields[0], &at, lane) == k
@@ -203,7 +204,8 @@ impl SolutionCounting<'_> {
             let mut own = self.random(i);
             let point =
                 SystemRows::new(model, compiled, &judged.layout, fields[i], &mut own, &verdict).ok()?;
-            let values = point.values(compiled, &judged.layout, model.constants.len());
+            let nodes = Factors::new(model, compiled, &judged.layout).nodes(compiled);
+            let values = point.values(compiled, &judged.layout, &nodes);
             let mut rng = model.random(seed, &format!("relations, field {i}"));
             let system = (model, compiled, judged);
             let known = global::known(
@@ -362,7 +364,9 @@ fn with_single(
     counted: Vec<SolutionCount>,
     unknowns: &[Option<SolutionCount>],
 ) -> Vec<SolutionCount> {
-    let single = |terms: &Terms| terms.iter().flat_map(|t| &t.1).all(|p| unknowns[p.0] == Some(Ok(1)));
+    // factors beyond the unknowns are known values
+    let is_single = |c: usize| unknowns.get(c).is_none_or(|count| *count == Some(Ok(1)));
+    let single = |terms: &Terms| terms.iter().flat_map(|t| &t.1).all(|p| is_single(p.0));
     functions.iter().zip(counted).map(|(terms, count)| if single(terms) { Ok(1) } else { count }).collect()
 }
 

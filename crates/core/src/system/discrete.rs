@@ -5,13 +5,14 @@ use std::collections::HashSet;
 
 use super::answer::{Analyzed, NumberOfSolutions, SystemAnalysis, SystemOptions, SystemQuantity, analyzed};
 use super::error::ModelError;
+use super::function_factors::Factors;
 use super::judge::{Judgement, judge};
 use super::model::{
     Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StartTime, StateStart, SystemModel,
 };
 use super::quotients::Terms;
 use crate::degree::status::Status;
-use crate::language::{Expression, Node};
+use crate::language::{Expression, Function, Node};
 use crate::remedies::Remedies;
 
 /// Name of a quantity a number of steps after t. Its third index tells it from all names of a file, which
@@ -62,7 +63,7 @@ fn number(n: usize) -> Node {
 }
 
 /// Sum of products of powers of named quantities.
-fn sum(terms: &Terms, name: &dyn Fn(usize) -> String) -> PlacedExpression {
+fn sum(terms: &Terms, factor: &dyn Fn(usize) -> (String, Option<Function>)) -> PlacedExpression {
     let mut nodes = vec![number(0)];
     let mut total = 0;
     for (coefficient, powers) in terms {
@@ -70,7 +71,10 @@ fn sum(terms: &Terms, name: &dyn Fn(usize) -> String) -> PlacedExpression {
         let mut product = nodes.len() - 1;
         for &(unknown, exponent) in powers {
             for _ in 0..exponent.unsigned_abs() {
-                nodes.push(Node::Name(name(unknown)));
+                let (name, function) = factor(unknown);
+                nodes.push(Node::Name(name));
+                let argument = nodes.len() - 1;
+                nodes.extend(function.map(|function| Node::Call { function, argument }));
                 let factor = nodes.len() - 1;
                 nodes.push(match exponent > 0 {
                     true => Node::Multiply(product, factor),
@@ -405,13 +409,14 @@ pub(super) fn analyze_discrete(
     let Analyzed { analysis: mut out, judged, functions } = analyzed(&whole, options_of_steps)?;
     let further = recount(model, &mut out, last, options_of_steps)?;
     let asked = whole.combinations.len();
-    let name = |c: usize| match judged.layout.unknowns.get(c) {
-        Some(u) => u.name.clone(),
-        None => whole.constants[c - judged.layout.unknowns.len()].0.name.clone(),
-    };
+    let factors = Factors::new(&whole, &whole.compile()?, &judged.layout);
     // combinations are those of the first experiment, where names have no number
-    let plain = |c: usize| name(c).trim_end_matches("@1").to_string();
-    let functions: Vec<PlacedExpression> = functions.iter().map(|terms| sum(terms, &plain)).collect();
+    let plain = |c: usize| factors.name(c, &whole, &judged.layout).trim_end_matches("@1").to_string();
+    let factor = |c: usize| match factors.function(c) {
+        Some(f) => (plain(f.lane), Some(f.function)),
+        None => (plain(c), None),
+    };
+    let functions: Vec<PlacedExpression> = functions.iter().map(|terms| sum(terms, &factor)).collect();
     whole.combinations.extend(functions);
     let found = degrees(model, (&whole, &judged), last, options.seed)?;
     for q in &mut out.quantities {

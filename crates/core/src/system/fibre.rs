@@ -24,6 +24,7 @@ use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::Op;
+use super::function_factors::Factors;
 use super::global::RelationConsequences;
 use super::judge::Judgement;
 use super::model::{Compiled, Role, SystemModel};
@@ -76,7 +77,7 @@ impl<'a> Equations<'a> {
         work: &'a mut RemainingWork,
     ) -> Self {
         let layout = &judged.layout;
-        let values = rows.values(compiled, layout, 0);
+        let values = rows.values(compiled, layout, &[]);
         let free = |lane: usize| {
             known.unique.contains(&lane) || judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane))
         };
@@ -477,13 +478,19 @@ pub(super) fn at_point(
 ) -> Result<Fibre, NotCounted> {
     let f = at.f;
     let verdict = work::Work::new(model.work_limit);
-    let Equations { zero, values, weights, lanes, .. } =
+    let Equations { zero, values, weights, lanes, rows, .. } =
         equations(model, compiled, judged, at, (&mut *rng, &verdict), &mut *work)?;
+    let factors = Factors::new(model, compiled, &judged.layout);
+    let known = rows.values(compiled, &judged.layout, &factors.nodes(compiled)).split_off(lanes.len());
     let degree = &judged.findings.degrees.degree;
     let counted = |lane: usize| degree[lane].is_some() || at.functions.is_some();
-    let own: Vec<u64> = values[..lanes.len()].to_vec();
-    let shown =
-        |(lane, p): (usize, &Polynomial)| if counted(lane) { p.clone() } else { Polynomial::default() };
+    // of inputs the derivatives, not the Taylor coefficients
+    let factor = |lane: usize| judged.layout.factorial(&f, lane);
+    let own: Vec<u64> = (0..lanes.len()).map(|lane| f.mul(values[lane], factor(lane))).collect();
+    let shown = |(lane, p): (usize, &Polynomial)| match counted(lane) {
+        true => p.scaled(&f, factor(lane)),
+        false => Polynomial::default(),
+    };
     let mut wanted: Vec<Polynomial> = lanes.iter().enumerate().map(shown).collect();
     let zero = without_lonely(zero, values.len(), &wanted);
     // all unknowns together, by a random combination
@@ -514,8 +521,10 @@ pub(super) fn at_point(
     let two =
         |p: &Result<Vec<u64>, NotCounted>| p.as_ref().is_ok_and(|p| polynomial::distinct_roots(&f, p) == 2);
     let is_pair = polynomials.iter().any(two) && two(&ring.values(&joint, work));
+    let factors: Vec<Polynomial> =
+        wanted.into_iter().chain(known.into_iter().map(Polynomial::constant)).collect();
     let mut of_function = |terms: &Terms| -> Result<usize, NotCounted> {
-        let element = ring.function(terms, &wanted, work)?;
+        let element = ring.function(terms, &factors, work)?;
         Ok(polynomial::distinct_roots(&f, &ring.values(&element, work)?))
     };
     let functions = at.functions.unwrap_or_default().iter().map(&mut of_function).collect();

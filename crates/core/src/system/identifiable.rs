@@ -5,38 +5,40 @@
 //! direction there. This is a linear system for the `a_j` from several random points, modulo a prime.
 //! Rational `a_j` are reconstructed, and the result is verified modulo the other prime. A scaling symmetry
 //! takes `f` to a sum of parts of one weight each, so products of weight zero suffice. What is still missing
-//! is taken from ratios of the coefficients of relations among output derivatives, then from these
-//! derivatives themselves.
+//! is taken from ratios of the coefficients of relations among output derivatives, then sought among the
+//! terms of derivatives of known functions along the motion.
 
 use obsdeg_exact::groebner::RemainingWork;
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
+use super::addition::written_apart;
 use super::error::ModelError;
+use super::families::{ProductFamily, families, weights};
+use super::function_factors::Factors;
 use super::functions::gcd;
 use super::global::functions_of_constants;
-use super::judge::{Judgement, PointDegrees, climb_at};
-use super::lie::{lie_derivatives, terms_of_quotient};
-use super::model::{Compiled, Role, SystemModel};
+use super::judge::{Judgement, PointDegrees, SystemCertainty, climb_at};
+use super::lie::{LaurentPolynomial, Motion, terms_of_quotient, variable};
+use super::model::{Compiled, SystemModel};
 use super::quotients::{QuotientPowers, Terms};
 use super::symmetry::{Invariant, Symmetries, integers, rationals};
 use super::work::Spent;
 use crate::degree::sparse::{extend_by_short_vectors, support};
 
-/// Largest number of products of a family; it decides the work.
-const PRODUCTS: usize = 800;
-/// Largest number of products that are listed before those with a weight are removed.
-const LISTED: usize = 200_000;
 /// Largest number of points.
 const POINTS: usize = 250;
 /// Number of points with other verdicts before one is taken nevertheless: its results do not hold at the
 /// first point.
 const ELSEWHERE: usize = 24;
-/// Limit of operations of all points and eliminations of a search.
+/// Limit of operations of all points and eliminations of a search among products, and of one among
+/// derivatives.
 const OPERATIONS: u64 = 200_000_000;
 /// Limit of the work of relations.
 const RELATIONS: u64 = 200_000_000;
 /// Largest number of terms of a function that is kept.
 const TERMS: usize = 40;
+/// Largest number of terms of a derivative among which functions are sought.
+const PARTS: usize = 300;
 /// Highest degree among the unknowns that the functions found before do not express.
 const RESTRICTED: u32 = 4;
 
@@ -47,15 +49,6 @@ pub(super) struct IdentifiableFunction {
     pub(super) terms: Terms,
     /// Observable degree of the function.
     pub(super) degree: usize,
-}
-
-/// Products among which functions are sought.
-struct ProductFamily {
-    variables: Vec<usize>,
-    /// Largest sum of the absolute exponents.
-    degree: u32,
-    /// True if exponents may be negative.
-    negative: bool,
 }
 
 /// Functions beyond the invariants of the symmetries, and the number of missing ones.
@@ -72,22 +65,21 @@ pub(super) fn identifiable_functions(
     let degrees = &judged.findings.degrees;
     let shown: Vec<bool> = (0..degrees.degree.len()).map(|c| judged.shown(model, c)).collect();
     let observable = degrees.degree.iter().zip(&shown).filter(|(d, shown)| d.is_some() && **shown).count();
-    let listed = symmetries.invariants.len();
-    let all = judged.span.as_ref().map_or(degrees.rank(), |span| of_shown(span, &shown));
-    let missing = all.saturating_sub(observable + listed);
-    let Some([f, other]) = judged.fields else { return Ok((Vec::new(), missing)) };
-    if missing == 0 {
-        return Ok((Vec::new(), 0));
-    }
+    let number = |all: usize| all.saturating_sub(observable + symmetries.invariants.len());
+    let missing = number(judged.span.as_ref().map_or(degrees.rank(), |span| of_shown(span, &shown)));
+    let Some([f, other]) = fields(judged).filter(|_| missing > 0) else { return Ok((Vec::new(), missing)) };
+    // values of functions in a field are independent of each other if functions of sums are written apart
+    let apart = if judged.fields.is_some() { None } else { written_apart(compiled) };
+    let compiled = apart.as_ref().unwrap_or(compiled);
     let mut search = FunctionSearch::new(model, compiled, judged, f, seed)?;
-    (search.all, search.shown) = (all, shown);
+    (search.all, search.shown) = (of_shown(&search.first().span, &shown), shown);
     let listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
     for terms in &listed {
         let gradient = search.gradient(terms, search.first());
         search.known.insert(&gradient);
     }
     let weights = weights(symmetries);
-    for family in families(judged, &search.shown) {
+    for family in families(judged, &search.factors, &search.shown, &weights) {
         if search.missing() == 0 {
             break;
         }
@@ -99,22 +91,28 @@ pub(super) fn identifiable_functions(
     for degree in 2..=RESTRICTED {
         for negative in [false, true] {
             if search.missing() > 0 {
-                let variables = search.not_expressed(&listed);
-                search.among(&ProductFamily { variables, degree, negative }.products(&weights))?;
+                let factors = search.not_expressed(&listed);
+                search.among(&ProductFamily { factors, degree, negative }.products(&weights))?;
             }
         }
     }
-    if search.missing() > 0 {
+    if search.missing() > 0 && judged.fields.is_some() {
         search.of_relations();
     }
     if search.missing() > 0 {
-        for terms in lie_derivatives(model, compiled, judged, f) {
-            search.keep(terms);
-        }
+        search.among_derivatives(&listed)?;
     }
     let missing = search.missing();
     let found = search.verified(other)?;
     Ok((found.0, missing + found.1))
+}
+
+/// The two prime fields of the verdicts; `None` if real numbers decided.
+fn fields(judged: &Judgement) -> Option<[Field; 2]> {
+    match judged.certainty {
+        SystemCertainty::Primes(by) => Some(by.primes.map(Field::new)),
+        SystemCertainty::Digits(_) => None,
+    }
 }
 
 /// Number of independent functionals in a span that contain only the unknowns in `shown`.
@@ -136,84 +134,12 @@ pub(super) fn terms_of(i: &Invariant) -> Terms {
     }
 }
 
-/// Effect of a scaling on the unknowns, as integer exponents.
-fn weights(symmetries: &Symmetries) -> Vec<Vec<(usize, i64)>> {
-    let plain = symmetries.found.iter().filter(|s| s.translation.is_empty());
-    let weights = plain.map(|s| {
-        let numbers: Vec<(i64, i64)> = s.scaling.iter().map(|t| t.1).collect();
-        s.scaling.iter().map(|t| t.0).zip(integers(&numbers)).collect()
-    });
-    weights.collect()
-}
-
-/// Families in the order of the search: parameters alone first, then with states, then with observable
-/// unknowns; polynomials first.
-fn families(judged: &Judgement, shown: &[bool]) -> Vec<ProductFamily> {
-    let degrees = &judged.findings.degrees;
-    let all: Vec<usize> =
-        (0..judged.layout.unknowns.len()).filter(|&c| degrees.excited[c] && shown[c]).collect();
-    let moved: Vec<usize> = all.iter().copied().filter(|&c| degrees.degree[c].is_none()).collect();
-    let is_parameter = |c: &usize| matches!(judged.layout.unknowns[*c].role, Role::Parameter(_));
-    let parameters: Vec<usize> = moved.iter().copied().filter(is_parameter).collect();
-    let family = |variables: &Vec<usize>, degree, negative| {
-        let variables = variables.clone();
-        ProductFamily { variables, degree, negative }
-    };
-    vec![
-        family(&parameters, 2, false),
-        family(&parameters, 3, true),
-        family(&parameters, 4, false),
-        family(&parameters, 5, false),
-        family(&moved, 2, false),
-        family(&moved, 3, true),
-        family(&all, 2, false),
-        family(&all, 3, true),
-        family(&moved, 4, true),
-        family(&all, 4, false),
-    ]
-}
-
-impl ProductFamily {
-    /// Products of weight zero that contain at least one unknown, short ones first; none if there are too
-    /// many.
-    fn products(&self, weights: &[Vec<(usize, i64)>]) -> Vec<QuotientPowers> {
-        let mut out: Vec<(u32, QuotientPowers)> = vec![(0, Vec::new())];
-        for &v in &self.variables {
-            let mut longer = Vec::new();
-            for (size, powers) in &out {
-                let left = (self.degree - size) as i32;
-                for e in (if self.negative { -left } else { 0 })..=left {
-                    let mut powers = powers.clone();
-                    if e != 0 {
-                        powers.push((v, e));
-                    }
-                    longer.push((size + e.unsigned_abs(), powers));
-                }
-                if longer.len() > LISTED {
-                    return Vec::new();
-                }
-            }
-            out = longer;
-        }
-        let weightless = |powers: &[(usize, i32)]| {
-            let weight = |w: &Vec<(usize, i64)>| -> i64 {
-                let own = |v: usize| w.iter().find(|t| t.0 == v).map_or(0, |t| t.1);
-                powers.iter().map(|&(v, e)| own(v) * i64::from(e)).sum()
-            };
-            !powers.is_empty() && weights.iter().all(|w| weight(w) == 0)
-        };
-        out.retain(|p| weightless(&p.1));
-        out.sort();
-        let products: Vec<QuotientPowers> = out.into_iter().map(|p| p.1).collect();
-        if products.len() > PRODUCTS { Vec::new() } else { products }
-    }
-}
-
 /// Search at points of one field.
 struct FunctionSearch<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
+    factors: Factors,
     f: Field,
     rng: SplitMix64,
     /// Points, with the unobservable directions there.
@@ -244,6 +170,7 @@ impl<'a> FunctionSearch<'a> {
             model,
             compiled,
             judged,
+            factors: Factors::new(model, compiled, &judged.layout),
             f,
             rng,
             points: Vec::new(),
@@ -285,12 +212,21 @@ impl<'a> FunctionSearch<'a> {
     }
 
     fn gradient(&self, terms: &[(i64, QuotientPowers)], at: &PointDegrees<Field>) -> Vec<u64> {
-        gradient(&at.span.field(), self.judged.layout.unknowns.len(), terms, at)
+        gradient(&at.span.field(), &self.factors, terms, at)
+    }
+
+    /// True if a function may contain the factor.
+    fn is_shown(&self, factor: usize) -> bool {
+        factor >= self.factors.unknowns || self.shown[factor]
     }
 
     /// Adds the functions among sums of products.
     fn among(&mut self, products: &[QuotientPowers]) -> Result<(), ModelError> {
         let f = self.f;
+        // more conditions than points can give
+        if products.len() > POINTS * self.points[0].1.len() {
+            return Ok(());
+        }
         let mut basis = Echelon::new(f, products.len());
         let (mut rank, mut still, mut k) = (0, 0, 0);
         while still < 2 {
@@ -303,11 +239,14 @@ impl<'a> FunctionSearch<'a> {
             let (at, directions) = &self.points[k];
             let inverses: Vec<u64> = at.values.iter().map(|&x| f.inv(x)).collect();
             let values: Vec<u64> = products.iter().map(|p| product(&f, p, &at.values, &inverses)).collect();
+            let slopes: Vec<Option<(usize, u64)>> =
+                (0..self.factors.len()).map(|c| self.factors.slope(c, &f, &at.values)).collect();
             for v in directions {
                 // m sum_c e_c v_c / x_c
+                let moved = |c: usize| slopes[c].map_or(0, |(lane, slope)| f.mul(slope, v[lane]));
                 let entry = |(powers, &m): (&QuotientPowers, &u64)| {
                     let along = powers.iter().fold(0, |s, &(c, e)| {
-                        f.add(s, f.mul(f.from_i64(e.into()), f.mul(v[c], inverses[c])))
+                        f.add(s, f.mul(f.from_i64(e.into()), f.mul(moved(c), inverses[c])))
                     });
                     f.mul(m, along)
                 };
@@ -329,6 +268,46 @@ impl<'a> FunctionSearch<'a> {
         Ok(())
     }
 
+    /// Adds functions among the terms of derivatives along the motion: of the outputs, of observable
+    /// unknowns, and of the functions found. The derivative of an identifiable function is identifiable, and
+    /// so is the coefficient of every product of inputs in it.
+    fn among_derivatives(&mut self, listed: &[Terms]) -> Result<(), ModelError> {
+        let motion = Motion::new(self.model, self.compiled, self.judged, &self.factors, self.f);
+        let Some(motion) = motion else { return Ok(()) };
+        self.spent = Spent::default();
+        let degrees = &self.judged.findings.degrees.degree;
+        let observable = (0..degrees.len()).filter(|&c| degrees[c].is_some() && self.shown[c]);
+        let mut open: Vec<LaurentPolynomial> = observable.map(|c| variable(&self.f, c)).collect();
+        open.extend(listed.iter().map(|terms| motion.polynomial(terms)));
+        for output in &motion.outputs {
+            for part in motion.coefficients(output) {
+                self.among_terms(&part)?;
+                open.push(part);
+            }
+        }
+        let mut taken = 0;
+        while self.missing() > 0 {
+            open.extend(self.found[taken..].iter().map(|found| motion.polynomial(&found.terms)));
+            taken = self.found.len();
+            let Some(shortest) = (0..open.len()).min_by_key(|&i| open[i].len()) else { break };
+            let Some(derivative) = motion.derivative(&open.remove(shortest)) else { continue };
+            for part in motion.coefficients(&derivative) {
+                self.among_terms(&part)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds functions among the terms of a polynomial.
+    fn among_terms(&mut self, p: &LaurentPolynomial) -> Result<(), ModelError> {
+        let products: Vec<QuotientPowers> = p.keys().filter(|powers| !powers.is_empty()).cloned().collect();
+        let is_shown = products.iter().flatten().all(|p| self.is_shown(p.0));
+        if self.missing() == 0 || products.is_empty() || products.len() > PARTS || !is_shown {
+            return Ok(());
+        }
+        self.among(&products)
+    }
+
     /// Adds ratios of the coefficients of relations among output derivatives.
     fn of_relations(&mut self) {
         let at = self.first().values.clone();
@@ -343,7 +322,7 @@ impl<'a> FunctionSearch<'a> {
 
     /// Keeps a function if it is identifiable and independent of those before it.
     fn keep(&mut self, terms: Terms) {
-        if !terms.iter().flat_map(|t| &t.1).all(|p| self.shown[p.0]) {
+        if !terms.iter().flat_map(|t| &t.1).all(|p| self.is_shown(p.0)) {
             return;
         }
         let gradient = self.gradient(&terms, self.first());
@@ -380,8 +359,8 @@ impl<'a> FunctionSearch<'a> {
         let spent = &mut Spent::default();
         let at = climb_at(self.model, self.compiled, &self.judged.layout, other, &mut rng, spent)?;
         let all = self.found.len();
-        let n = self.judged.layout.unknowns.len();
-        let holds = |i: &IdentifiableFunction| at.span.contains(&gradient(&other, n, &i.terms, &at));
+        let holds =
+            |i: &IdentifiableFunction| at.span.contains(&gradient(&other, &self.factors, &i.terms, &at));
         let found: Vec<IdentifiableFunction> = self.found.into_iter().filter(holds).collect();
         let lost = all - found.len();
         Ok((found, lost))
@@ -397,34 +376,49 @@ fn product(f: &Field, powers: &[(usize, i32)], values: &[u64], inverses: &[u64])
 }
 
 /// Differential of a function at a point (shape: unknowns).
-fn gradient(f: &Field, n: usize, terms: &[(i64, QuotientPowers)], at: &PointDegrees<Field>) -> Vec<u64> {
+fn gradient(
+    f: &Field,
+    factors: &Factors,
+    terms: &[(i64, QuotientPowers)],
+    at: &PointDegrees<Field>,
+) -> Vec<u64> {
     let inverses: Vec<u64> = at.values.iter().map(|&x| f.inv(x)).collect();
-    let mut out = vec![0; n];
+    let mut out = vec![0; factors.unknowns];
     for (number, powers) in terms {
         let m = f.mul(f.from_i64(*number), product(f, powers, &at.values, &inverses));
-        for &(c, e) in powers.iter().filter(|p| p.0 < n) {
-            out[c] = f.add(out[c], f.mul(f.from_i64(e.into()), f.mul(m, inverses[c])));
+        for &(c, e) in powers {
+            let Some((lane, slope)) = factors.slope(c, f, &at.values) else { continue };
+            let along = f.mul(f.from_i64(e.into()), f.mul(m, inverses[c]));
+            out[lane] = f.add(out[lane], f.mul(slope, along));
         }
     }
     out
 }
 
 impl IdentifiableFunction {
+    /// Powers that divide all terms, if there are several.
+    fn common_factor(&self) -> QuotientPowers {
+        let [first, others @ ..] = &self.terms[..] else { return Vec::new() };
+        if others.is_empty() {
+            return Vec::new();
+        }
+        let smallest = |&(c, e): &(usize, i32)| {
+            let exponents = others.iter().map(|t| t.1.iter().find(|p| p.0 == c).map_or(0, |p| p.1));
+            let least = exponents.map(|x| x * e.signum()).fold(e.abs(), i32::min);
+            (least > 0).then(|| (c, least * e.signum()))
+        };
+        first.1.iter().filter_map(smallest).collect()
+    }
+
     /// Function in words: `S*w`, `U*w + I*w`, `beta/(N*w)`; common factors stand before brackets.
     pub(super) fn text(&self, name: &dyn Fn(usize) -> String) -> String {
-        let common: QuotientPowers = match self.terms.len() {
-            0 | 1 => Vec::new(),
-            _ => self.terms[0]
-                .1
-                .iter()
-                .copied()
-                .filter(|p| self.terms.iter().all(|t| t.1.contains(p)))
-                .collect(),
-        };
+        let common = self.common_factor();
         let divisor = self.terms.iter().fold(0, |g, t| gcd(g, t.0)).max(1);
         let mut sum = String::new();
         for (number, powers) in &self.terms {
-            let rest: QuotientPowers = powers.iter().copied().filter(|p| !common.contains(p)).collect();
+            let own = |c: usize| common.iter().find(|p| p.0 == c).map_or(0, |p| p.1);
+            let rest = powers.iter().map(|&(c, e)| (c, e - own(c))).filter(|p| p.1 != 0);
+            let rest: QuotientPowers = rest.collect();
             let number = number / divisor;
             sum.push_str(match (sum.is_empty(), number < 0) {
                 (true, true) => "-",
@@ -476,6 +470,11 @@ mod tests {
         let text = |terms: Vec<(i64, QuotientPowers)>| IdentifiableFunction { terms, degree: 0 }.text(&name);
         assert_eq!(text(vec![(1, vec![(3, 1), (4, -1), (0, -1)])]), "b/(N*w)");
         assert_eq!(text(vec![(2, vec![(0, 1), (1, 1)]), (-4, vec![(0, 1), (2, 2)])]), "w*(U - 2*I^2)");
+        assert_eq!(text(vec![(1, vec![(0, 1), (1, 1)]), (1, vec![(0, 2)])]), "w*(U + w)");
+        assert_eq!(
+            text(vec![(1, vec![(3, 1), (4, -2)]), (1, vec![(4, -1)]), (1, vec![(4, -3)])]),
+            "(b/N + 1 + 1/N^2)/N"
+        );
         assert_eq!(text(vec![(1, vec![(1, 1), (4, -1)]), (1, vec![(2, 1), (4, -1)])]), "(U + I)/N");
         assert_eq!(text(vec![(3, vec![(1, 1)]), (1, vec![])]), "3*U + 1");
     }

@@ -8,6 +8,7 @@ use super::branches::{BranchSide, Signs, sided, sides};
 use super::constraints::slots_of;
 use super::dag::{Dag, Op};
 use super::error::ModelError;
+use super::function_factors::Factors;
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, Role, StartTime, SystemModel};
 use super::real_points::{dependent_at_points, real_point};
@@ -16,6 +17,7 @@ use super::taylor::Singular;
 use super::values::Values;
 use super::work::{Spent, Work, WorkStep, product};
 use crate::degree::findings::{ByPrimes, Findings};
+use crate::degree::rows::DerivativeRows;
 use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
 use crate::language::Function;
@@ -125,7 +127,7 @@ pub(crate) struct PointDegrees<S: Values> {
     pub(crate) combinations: Vec<Verdict>,
     /// Span of all rows.
     pub(crate) span: S::Space,
-    /// Value of every unknown at the point, then of every known constant.
+    /// Value of every unknown at the point, then of the nodes of [`Factors`].
     pub(crate) values: Vec<S::Element>,
     /// True if the last order is proven to be the last.
     ended: bool,
@@ -209,7 +211,10 @@ fn climbed<S: Values>(
             return Err(singular::<S>(model, compiled, reason));
         }
     };
-    let gradients = rows.combinations().to_vec();
+    let scales = input_scales(layout, &field);
+    let mut gradients = rows.combinations().to_vec();
+    gradients.iter_mut().for_each(|row| scale(&field, row, &scales));
+    let mut rows = DerivativesOfInputs { rows: &mut rows, scales: &scales };
     let mut found = vec![None; gradients.len()];
     let mut basis = <S::Space as RowSpace>::new(field.clone(), layout.unknowns.len());
     let mut steps = OrderedRows { field: field.clone(), rows: Vec::new() };
@@ -235,11 +240,56 @@ fn climbed<S: Values>(
             Verdict { status: Status::of(degree, moves), degree }
         })
         .collect();
-    let values = rows.values(compiled, layout, model.constants.len());
+    let rows = rows.rows;
+    let mut values = rows.values(compiled, layout, &Factors::new(model, compiled, layout).nodes(compiled));
+    for (lane, _) in &scales {
+        values[*lane] = field.mul(&values[*lane], &layout.factorial(&field, *lane));
+    }
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
     let signs = rows.signs(&sided(compiled));
     Ok(PointDegrees { signs, degrees, combinations, span: basis, values, ended, closed, gap, steps })
+}
+
+/// Unknowns that are second or higher derivatives of inputs, with the inverse of `k!`.
+fn input_scales<S: Values>(layout: &Layout, f: &S) -> Vec<(usize, S::Element)> {
+    let lanes = (0..layout.unknowns.len()).filter(|&lane| layout.unknowns[lane].derivative > 1);
+    lanes.map(|lane| (lane, f.inverse(&layout.factorial(f, lane)).unwrap_or(f.zero()))).collect()
+}
+
+/// Turns a row by Taylor coefficients of inputs into one by their derivatives.
+fn scale<S: Values>(f: &S, row: &mut [S::Element], scales: &[(usize, S::Element)]) {
+    scales.iter().for_each(|(lane, factor)| row[*lane] = f.mul(&row[*lane], factor));
+}
+
+/// Rows by the derivatives of inputs in place of their Taylor coefficients.
+struct DerivativesOfInputs<'r, 'a, S: Values> {
+    rows: &'r mut SystemRows<'a, S>,
+    scales: &'r [(usize, S::Element)],
+}
+
+impl<S: Values> DerivativeRows for DerivativesOfInputs<'_, '_, S> {
+    type Field = S;
+
+    fn field(&self) -> S {
+        self.rows.field()
+    }
+
+    fn columns(&self) -> usize {
+        self.rows.columns()
+    }
+
+    fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[S::Element]) -> bool) -> bool {
+        if self.scales.is_empty() {
+            return self.rows.emit(order, sink);
+        }
+        let (f, scales) = (self.field(), self.scales);
+        self.rows.emit(order, &mut |row| {
+            let mut row = row.to_vec();
+            scale(&f, &mut row, scales);
+            sink(&row)
+        })
+    }
 }
 
 /// Message for a node without a value, or a derivative, at any of `points` points.

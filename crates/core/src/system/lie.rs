@@ -1,117 +1,201 @@
-//! Derivatives of the outputs as polynomials in the unknowns: identifiable functions by definition, used if
-//! no simpler ones were found.
+//! Derivatives of identifiable functions along the motion, which are identifiable too: polynomials in the
+//! factors, in which powers may be negative, split by the products of the inputs.
 
-use obsdeg_exact::Field;
-use obsdeg_exact::Scalars;
+use std::collections::BTreeMap;
+
 use obsdeg_exact::multivariate::{Monomial, Polynomial};
+use obsdeg_exact::{Field, Scalars};
 
 use super::dag::Op;
+use super::function_factors::Factors;
 use super::judge::Judgement;
 use super::model::{Compiled, KnownInput, Role, SystemModel};
-use super::quotients::Terms;
+use super::quotients::{QuotientPowers, Terms};
+use super::rows::Unknown;
 use super::values::Values;
 
 /// Largest number of terms of a polynomial that is formed, and of a function that is returned.
 const FORMED: usize = 2000;
 const GIVEN: usize = 40;
 
-/// Coefficients of derivatives of the outputs by the products of inputs, in the order of the derivatives.
-/// Empty for a model that is not polynomial, or with special starts, several runs, arbitrary inputs or
-/// generic constants.
-pub(super) fn lie_derivatives(
-    model: &SystemModel,
-    compiled: &Compiled,
-    judged: &Judgement,
-    f: Field,
-) -> Vec<Terms> {
-    let alone = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
-    let inputs = model.known_inputs.len();
-    let generic = (0..inputs).all(|i| matches!(model.known_input(0, i), KnownInput::Generic));
-    if !alone || !generic || model.experiments > 1 || !model.unknown_inputs.is_empty() {
-        return Vec::new();
+/// Sum of products of powers with coefficients in a prime field, none of which is zero.
+pub(super) type LaurentPolynomial = BTreeMap<QuotientPowers, u64>;
+
+/// Adds `c a b` to a sum; `None` if there are too many terms.
+fn add_product(
+    f: &Field,
+    sum: &mut LaurentPolynomial,
+    a: &LaurentPolynomial,
+    b: &LaurentPolynomial,
+    c: u64,
+) -> Option<()> {
+    if a.len() * b.len() > FORMED {
+        return None;
     }
-    let lanes = judged.layout.unknowns.len();
-    let jet = |input: usize, order: usize| (lanes + order * inputs + input) as u32;
-    let Some(nodes) = nodes(compiled, judged, &f, &|input| jet(input, 0)) else { return Vec::new() };
-    let mut rates: Vec<(u32, Polynomial)> = Vec::new();
-    for (s, &rate) in compiled.rates(0).iter().enumerate() {
-        let Some(lane) = judged.layout.lane(Role::State(s), 0) else { return Vec::new() };
-        rates.push((lane as u32, nodes[rate].clone()));
-    }
-    let mut derivatives: Vec<Polynomial> = compiled.outputs(0).iter().map(|&o| nodes[o].clone()).collect();
-    let mut out = Vec::new();
-    for order in 0..=lanes {
-        for p in &derivatives {
-            out.extend(coefficients(p, lanes as u32, &f));
-        }
-        // the next derivative contains one order more of the inputs
-        rates.extend((0..inputs).map(|i| (jet(i, order), Polynomial::variable(&f, jet(i, order + 1)))));
-        for p in &mut derivatives {
-            let mut next = Polynomial::default();
-            for (v, rate) in &rates {
-                let part = p.derivative(&f, *v);
-                if part.len() * rate.len() > FORMED {
-                    return out;
-                }
-                next.add_product(&f, &part, rate);
-            }
-            if next.len() > FORMED {
-                return out;
-            }
-            *p = next;
+    for (first, x) in a {
+        for (second, y) in b {
+            let entry = sum.entry(multiplied(first, second)).or_insert(0);
+            *entry = f.add(*entry, f.mul(c, f.mul(*x, *y)));
         }
     }
+    sum.retain(|_, x| *x != 0);
+    (sum.len() <= FORMED).then_some(())
+}
+
+/// Product of two products of powers.
+fn multiplied(a: &[(usize, i32)], b: &[(usize, i32)]) -> QuotientPowers {
+    let mut out = a.to_vec();
+    for &(v, e) in b {
+        match out.iter_mut().find(|p| p.0 == v) {
+            Some(own) => own.1 += e,
+            None => out.push((v, e)),
+        }
+    }
+    out.retain(|p| p.1 != 0);
+    out.sort_unstable();
     out
 }
 
-/// Every node as a polynomial; `None` if a node in use is none.
-fn nodes(
-    compiled: &Compiled,
-    judged: &Judgement,
-    f: &Field,
-    input: &dyn Fn(usize) -> u32,
-) -> Option<Vec<Polynomial>> {
-    let needed = super::fibre::reached(compiled, compiled.outputs(0), |s| Some(compiled.rates(0)[s]));
-    let mut out: Vec<Polynomial> = Vec::with_capacity(needed.len());
-    for (op, needed) in compiled.dag.ops.iter().zip(needed) {
-        let mut p = Polynomial::default();
-        if needed {
-            match *op {
-                Op::Number { mantissa, decimals } => p = Polynomial::constant(f.number(mantissa, decimals)),
-                Op::Slot(slot) => match compiled.roles[slot] {
-                    Role::KnownInput(i) => p = Polynomial::variable(f, input(i)),
-                    role => p = Polynomial::variable(f, judged.layout.lane(role, 0)? as u32),
-                },
-                Op::Add(a, b) | Op::Subtract(a, b) => {
-                    p = out[a].clone();
-                    let sign = if matches!(op, Op::Add(..)) { f.one() } else { f.neg(f.one()) };
-                    p.add_scaled(f, &out[b], sign);
-                }
-                Op::Multiply(a, b) if out[a].len() * out[b].len() <= FORMED => {
-                    p.add_product(f, &out[a], &out[b]);
-                }
-                Op::Divide(a, b) => {
-                    let below = out[b].as_constant().filter(|&x| x != 0)?;
-                    p = out[a].scaled(f, f.inv(below));
-                }
-                _ => return None,
-            }
-        }
-        out.push(p);
-    }
-    Some(out)
+fn constant(f: &Field, c: u64) -> LaurentPolynomial {
+    let one = LaurentPolynomial::from([(Vec::new(), c)]);
+    if f.is_zero(&c) { LaurentPolynomial::new() } else { one }
 }
 
-/// Coefficients of a polynomial by the products of variables from `first` on, with integer numbers; only
-/// those with few terms.
-fn coefficients(p: &Polynomial, first: u32, f: &Field) -> Vec<Terms> {
-    let mut parts: std::collections::BTreeMap<Monomial, Vec<(Monomial, u64)>> =
-        std::collections::BTreeMap::new();
-    for (m, c) in p.terms() {
-        let (of_unknowns, of_inputs): (Vec<_>, Vec<_>) = m.iter().copied().partition(|x| x.0 < first);
-        parts.entry(of_inputs).or_default().push((of_unknowns, c));
+/// Polynomial that is one variable.
+pub(super) fn variable(f: &Field, v: usize) -> LaurentPolynomial {
+    LaurentPolynomial::from([(vec![(v, 1)], f.one())])
+}
+
+/// Rates of change of the factors of a model, where they are polynomials in factors and inputs.
+pub(super) struct Motion {
+    f: Field,
+    /// Rate of change by factor; `None` if it is no such polynomial.
+    rates: Vec<Option<LaurentPolynomial>>,
+    /// Number of the factors; inputs that are not constant have the numbers after them.
+    factors: usize,
+    /// Outputs that are such polynomials.
+    pub(super) outputs: Vec<LaurentPolynomial>,
+}
+
+impl Motion {
+    /// The motion of a model with one experiment; `None` with several.
+    pub(super) fn new(
+        model: &SystemModel,
+        compiled: &Compiled,
+        judged: &Judgement,
+        factors: &Factors,
+        f: Field,
+    ) -> Option<Self> {
+        if model.experiments > 1 {
+            return None;
+        }
+        let layout = &judged.layout;
+        let nodes = nodes(model, compiled, judged, factors, &f);
+        let next = |u: &Unknown| {
+            let is_next = |other: &Unknown| other.role == u.role && other.derivative == u.derivative + 1;
+            layout.unknowns.iter().position(is_next)
+        };
+        let rate = |u: &Unknown| match u.role {
+            Role::State(s) => nodes[compiled.rates(0)[s]].clone(),
+            Role::UnknownInput(i) => match next(u) {
+                Some(next) => Some(variable(&f, next)),
+                None => model.unknown_inputs[i].1.map(|_| LaurentPolynomial::new()),
+            },
+            _ => Some(LaurentPolynomial::new()),
+        };
+        let mut rates: Vec<Option<LaurentPolynomial>> = layout.unknowns.iter().map(rate).collect();
+        rates.resize(factors.of_functions().start, Some(LaurentPolynomial::new()));
+        for own in &factors.functions {
+            let Op::Primitive { weight, .. } = compiled.dag.ops[own.node] else { return None };
+            let product = nodes[weight].as_ref().zip(rates[own.lane].as_ref()).and_then(|(weight, rate)| {
+                let mut product = LaurentPolynomial::new();
+                add_product(&f, &mut product, weight, rate, f.one())?;
+                Some(product)
+            });
+            rates.push(product);
+        }
+        let outputs = compiled.outputs(0).iter().filter_map(|&o| nodes[o].clone()).collect();
+        Some(Self { f, rates, factors: factors.len(), outputs })
     }
-    parts.into_values().filter_map(|terms| with_integers(f, &terms)).collect()
+
+    /// Derivative of a polynomial in the factors; `None` if it is not formed.
+    pub(super) fn derivative(&self, p: &LaurentPolynomial) -> Option<LaurentPolynomial> {
+        let f = &self.f;
+        let mut out = LaurentPolynomial::new();
+        for (powers, &x) in p {
+            for &(v, e) in powers {
+                let rate = self.rates[v].as_ref()?;
+                let lower = LaurentPolynomial::from([(multiplied(powers, &[(v, -1)]), x)]);
+                add_product(f, &mut out, &lower, rate, f.from_i64(e.into()))?;
+            }
+        }
+        Some(out)
+    }
+
+    /// Coefficients of a polynomial by the products of inputs: products of powers of factors.
+    pub(super) fn coefficients(&self, p: &LaurentPolynomial) -> Vec<LaurentPolynomial> {
+        let mut parts: BTreeMap<QuotientPowers, LaurentPolynomial> = BTreeMap::new();
+        for (powers, &x) in p {
+            let (own, inputs): (Vec<_>, Vec<_>) = powers.iter().partition(|p| p.0 < self.factors);
+            parts.entry(inputs).or_default().insert(own, x);
+        }
+        parts.into_values().collect()
+    }
+
+    /// Function as a polynomial.
+    pub(super) fn polynomial(&self, terms: &Terms) -> LaurentPolynomial {
+        let f = &self.f;
+        terms.iter().map(|(c, powers)| (powers.clone(), f.from_i64(*c))).collect()
+    }
+}
+
+/// Every node as a polynomial in factors and inputs; `None` for another node.
+fn nodes(
+    model: &SystemModel,
+    compiled: &Compiled,
+    judged: &Judgement,
+    factors: &Factors,
+    f: &Field,
+) -> Vec<Option<LaurentPolynomial>> {
+    let mut out: Vec<Option<LaurentPolynomial>> = Vec::with_capacity(compiled.dag.ops.len());
+    for (node, op) in compiled.dag.ops.iter().enumerate() {
+        let sum = |a: usize, b: usize, sign: u64| {
+            let (a, b) = (out[a].as_ref()?, out[b].as_ref()?);
+            let mut sum = a.clone();
+            add_product(f, &mut sum, b, &constant(f, f.one()), sign)?;
+            Some(sum)
+        };
+        let product = |a: &LaurentPolynomial, b: &LaurentPolynomial| {
+            let mut product = LaurentPolynomial::new();
+            add_product(f, &mut product, a, b, f.one())?;
+            Some(product)
+        };
+        let own = match *op {
+            Op::Number { mantissa, decimals } => Some(constant(f, f.number(mantissa, decimals))),
+            Op::Slot(slot) => match compiled.roles[slot] {
+                Role::KnownInput(i) if matches!(model.known_input(0, i), KnownInput::Generic) => {
+                    Some(variable(f, factors.len() + i))
+                }
+                role => factors.of_role(role, &judged.layout).map(|v| variable(f, v)),
+            },
+            Op::Add(a, b) => sum(a, b, f.one()),
+            Op::Subtract(a, b) => sum(a, b, f.neg(f.one())),
+            Op::Multiply(a, b) => out[a].as_ref().zip(out[b].as_ref()).and_then(|(a, b)| product(a, b)),
+            Op::Divide(a, b) => out[a].as_ref().zip(out[b].as_ref()).and_then(|(a, b)| {
+                let (powers, &x) = b.first_key_value().filter(|_| b.len() == 1)?;
+                let inverse = powers.iter().map(|&(v, e)| (v, -e)).collect();
+                product(a, &LaurentPolynomial::from([(inverse, f.inv(x))]))
+            }),
+            Op::Primitive { .. } => {
+                let own =
+                    factors.of_functions().find(|&c| factors.function(c).is_some_and(|f| f.node == node));
+                own.map(|c| variable(f, c))
+            }
+            Op::Pi => None,
+        };
+        out.push(own);
+    }
+    out
 }
 
 /// Terms with integer coefficients, up to a common factor; `None` if there are many, or some are not
@@ -133,15 +217,9 @@ pub(super) fn terms_of_quotient(f: &Field, [above, below]: &[Polynomial; 2]) -> 
     let (divisor, _) = one.terms().next().filter(|_| one.len() == 1)?;
     let terms: Vec<(Monomial, u64)> = sum.terms().map(|(m, c)| (m.clone(), c)).collect();
     let mut terms = with_integers(f, &terms)?;
+    let divisor: QuotientPowers = divisor.iter().map(|&(v, e)| (v as usize, -(e as i32))).collect();
     for (_, powers) in &mut terms {
-        for &(v, e) in divisor {
-            match powers.iter_mut().find(|p| p.0 == v as usize) {
-                Some(own) => own.1 -= e as i32,
-                None => powers.push((v as usize, -(e as i32))),
-            }
-        }
-        powers.retain(|p| p.1 != 0);
-        powers.sort_unstable();
+        *powers = multiplied(powers, &divisor);
     }
     Some(terms)
 }

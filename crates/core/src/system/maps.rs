@@ -4,7 +4,6 @@
 //! value is sought as an expression of the values of the first solution, among quotients `a b/c` of unknowns
 //! and sums of two or three of these. An expression counts if it has that value at a random point of both
 //! fields.
-//! or three of these; an expression counts if it has that value at a random point of both fields.
 
 use std::collections::BTreeMap;
 

@@ -107,6 +107,12 @@ impl Layout {
         Self { unknowns, bound, closed, dependent: 0, sides: None }
     }
 
+    /// Ratio of an unknown to the Taylor coefficient that stands for it in rows: `k!` for the derivative k of
+    /// an input, 1 for every other unknown.
+    pub(super) fn factorial<S: Scalars>(&self, f: &S, lane: usize) -> S::Element {
+        (2..=self.unknowns[lane].derivative).fold(f.one(), |x, k| f.mul(&x, &f.integer(k as i64)))
+    }
+
     pub(super) fn lane(&self, role: Role, experiment: usize) -> Option<usize> {
         let own = |u: &Unknown| u.role == role && u.experiment.is_none_or(|e| e == experiment);
         self.unknowns.iter().position(own)
@@ -722,17 +728,22 @@ impl<'a, S: Values> SystemRows<'a, S> {
         self.runs[run].taylor.is_known(node)
     }
 
-    /// Value of every unknown at this point, then of every known constant (in the first segment).
-    pub(crate) fn values(&self, compiled: &Compiled, layout: &Layout, constants: usize) -> Vec<S::Element> {
+    /// Value of every unknown at this point (of inputs the Taylor coefficients), then of some nodes (in the
+    /// first segment), zero without a node.
+    pub(crate) fn values(
+        &self,
+        compiled: &Compiled,
+        layout: &Layout,
+        nodes: &[Option<usize>],
+    ) -> Vec<S::Element> {
         let segments = compiled.segments.len().max(1);
-        let node_of = |role: Role| compiled.node_of(role);
         let value = |u: &Unknown| {
             let run = self.runs.get(u.experiment.unwrap_or(0) * segments)?;
-            Some(run.taylor.value(node_of(u.role)?, u.derivative))
+            Some(run.taylor.value(compiled.node_of(u.role)?, u.derivative))
         };
-        let constant = |c: usize| Some(self.runs.first()?.taylor.start(node_of(Role::Constant(c))?));
+        let of_node = |node: &Option<usize>| Some(self.runs.first()?.taylor.value((*node)?, 0));
         let unknowns = layout.unknowns.iter().map(value);
-        unknowns.chain((0..constants).map(constant)).map(|x| x.unwrap_or(self.field.zero())).collect()
+        unknowns.chain(nodes.iter().map(of_node)).map(|x| x.unwrap_or(self.field.zero())).collect()
     }
 }
 

@@ -453,7 +453,7 @@ fn check(
     let values: Vec<(String, u64)> = (symbols.iter().filter(|s| used.contains(s.raw.as_str())))
         .filter_map(|s| Some((s.raw.clone(), rows.derivative(s.node?, s.order))))
         .collect();
-    let truth = rows.values(compiled, &judged.layout, 0);
+    let truth = rows.values(compiled, &judged.layout, &[]);
     let holds = |(text, truth): (&Option<String>, &u64)| {
         let value = text.as_ref().and_then(|t| {
             let parsed = parse_with(t, Names::Plain).ok()?;
