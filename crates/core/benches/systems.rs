@@ -141,6 +141,13 @@ fn chain_of(bencher: Bencher<'_, '_>, n: usize) {
     bencher.bench(|| rank_of(&model));
 }
 
+/// Chains of 250 and 500 unknowns, whose rows are computed backwards.
+#[divan::bench(args = [125, 250], sample_count = 1, sample_size = 1)]
+fn long_chain_of(bencher: Bencher<'_, '_>, n: usize) {
+    let model = chain(n, false);
+    bencher.bench(|| rank_of(&model));
+}
+
 /// Chains with a sine in every link: functions of independent arguments.
 #[divan::bench(args = [4, 8, 16, 32, 64], max_time = 3)]
 fn chain_of_functions(bencher: Bencher<'_, '_>, n: usize) {

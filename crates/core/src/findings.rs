@@ -138,7 +138,7 @@ impl<'a> JudgedScheme<'a> {
                 asked: requested.iter().map(|r| r.verdict).collect(),
                 seed: *seed,
             },
-            certainty: ByPrimes { primes, error_bound: verdicts.error_bound },
+            certainty: ByPrimes { primes, third: None, error_bound: verdicts.error_bound },
             combinations,
             null_space,
             accuracy,

@@ -118,10 +118,24 @@ impl Field {
         ((t + wide_product(m, self.p)) >> 64) as u64
     }
 
+    /// An element equal to `a b + c d`, below `2p`, for all of them below `2p`: `t < 8 p^2`.
+    #[inline]
+    pub(crate) fn loose_sum(&self, [a, b]: [u64; 2], [c, d]: [u64; 2]) -> u64 {
+        let t = wide_product(a, b) + wide_product(c, d);
+        let m = (t as u64).wrapping_mul(self.neg_inv);
+        ((t + wide_product(m, self.p)) >> 64) as u64
+    }
+
     /// Reduces a number below `4p` to one below `2p`.
     #[inline]
     pub(crate) fn loosely(&self, a: u64) -> u64 {
         a.min(a.wrapping_sub(2 * self.p))
+    }
+
+    /// Reduces a number below `2p`.
+    #[inline]
+    pub(crate) fn reduced(&self, a: u64) -> u64 {
+        a.min(a.wrapping_sub(self.p))
     }
 
     /// `a^e`.

@@ -264,8 +264,9 @@ fn assumed(a: &SystemAnalysis) -> Vec<String> {
         ));
     }
     assumed.push(match (&a.primes, a.error_bound) {
-        (Some([p, q]), Some(bound)) => format!(
-            "ranks modulo the random primes {p} and {q} at random points; {}; seed {}",
+        (Some(primes), Some(bound)) => format!(
+            "ranks modulo the random primes {} at random points; {}; seed {}",
+            primes.join(" and "),
             words::wrong_below(bound),
             a.seed
         ),

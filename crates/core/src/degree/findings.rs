@@ -21,14 +21,21 @@ pub struct Findings {
 pub struct ByPrimes {
     /// The two random primes (61 bits) that agree.
     pub primes: [u64; 2],
+    /// A third one, where two leave a larger probability than one in 10^9; `None` where they do not.
+    pub third: Option<u64>,
     /// Bound on the probability that any verdict is wrong.
     pub error_bound: f64,
 }
 
 impl ByPrimes {
-    /// The primes as text: they exceed the integers that a JSON number holds exactly.
+    /// The two primes as text: they exceed the integers that a JSON number holds exactly.
     pub fn primes_as_text(&self) -> [String; 2] {
         self.primes.map(|p| p.to_string())
+    }
+
+    /// All primes as text.
+    pub fn all_as_text(&self) -> Vec<String> {
+        self.primes_as_text().into_iter().chain(self.third.map(|p| p.to_string())).collect()
     }
 }
 

@@ -6,12 +6,14 @@
 //! Krener 1977, doi:10.1109/TAC.1977.1101601, for the Lie derivatives of covectors). A row of order k is the
 //! value at the start, which is k! times the Taylor coefficient. For orders below K, series of length K - k
 //! suffice. So n unknowns and n orders take n^2 numbers in memory instead of n^3, and n^2 products of
-//! series, or n^3 log n operations if these are transformed.
+//! series, or n^3 log n operations if these are transformed. Where the Jacobian `df_r/dx_s` has few entries
+//! its series replace the graph: each `w_r` is transformed once, and each sum once back.
 
 use std::cell::RefCell;
 
 use obsdeg_exact::interrupt;
 
+use super::constraints::below;
 use super::dag::{Dag, Op};
 use super::taylor::{Initial, Signal, Taylor};
 use super::values::Values;
@@ -24,6 +26,12 @@ type TaylorSeries<S> = Vec<<S as obsdeg_exact::Scalars>::Element>;
 const SHORT: usize = 16;
 /// Factor by which series that are too short are lengthened. All their orders are computed again.
 const LONGER: usize = 4;
+
+/// Entry of the Jacobian: the slot of its row, which is a state, and its series.
+type JacobianEntry<S> = (usize, TaylorSeries<S>);
+
+/// Largest number of nodes below all rates, for each node of the graph, for which a Jacobian is computed.
+const SHARED: usize = 8;
 
 /// Rows of one run, computed backwards.
 #[derive(Debug, Clone)]
@@ -41,6 +49,10 @@ pub(super) struct Adjoint<'a, S: Values> {
     values: Taylor<'a, S>,
     /// Factors of every quotient: one over the divisor, and minus the quotient over the divisor.
     quotients: Vec<Option<[TaylorSeries<S>; 2]>>,
+    /// Whole numbers from one on.
+    integers: Vec<S::Element>,
+    /// Entries of the Jacobian by the slot of their column; `None` if sweeps through the graph take less.
+    jacobian: Option<Vec<Vec<JacobianEntry<S>>>>,
     plan: RefCell<S::Plan>,
     /// Order of the differentials in `held`.
     order: usize,
@@ -77,6 +89,8 @@ impl<'a, S: Values> Adjoint<'a, S> {
             enough,
             values,
             quotients,
+            integers: Vec::new(),
+            jacobian: None,
             plan,
             order: 0,
             held: Vec::new(),
@@ -126,6 +140,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
             _ => None,
         };
         self.quotients = self.dag.ops.iter().enumerate().map(quotient).collect();
+        self.integers = (1..=self.length as i64).map(|k| self.f.integer(k)).collect();
         self.order = 0;
         let start = |&output: &usize| {
             let mut one = vec![self.f.zero(); n];
@@ -133,6 +148,90 @@ impl<'a, S: Values> Adjoint<'a, S> {
             self.sweep(vec![(output, one)], n)
         };
         self.held = self.outputs.iter().map(start).collect();
+        self.jacobian = self.jacobian();
+        if self.jacobian.is_some() {
+            // with the keys of its entries
+            self.plan = RefCell::new(self.f.plan(self.length));
+        }
+    }
+
+    /// Slots of the states, each with the node of its rate.
+    fn rates(&self) -> Vec<(usize, usize)> {
+        let rate = |(slot, signal): (usize, &Signal<S::Element>)| match signal {
+            Signal::State { rate } => Some((slot, *rate)),
+            _ => None,
+        };
+        self.signals.iter().enumerate().filter_map(rate).collect()
+    }
+
+    /// Numbers of series that a sweep from all rates transforms and multiplies; `None` if the nodes below each
+    /// rate are many together.
+    fn sweep_size(&self) -> Option<(usize, usize)> {
+        let (mut transforms, mut products, mut nodes) = (0, 0, 0);
+        let mut counted = vec![false; self.dag.ops.len()];
+        for (_, rate) in self.rates() {
+            for i in below(self.dag, rate) {
+                nodes += 1;
+                if nodes > SHARED * self.dag.ops.len() {
+                    return None;
+                }
+                if std::mem::replace(&mut counted[i], true) || self.values.is_known(i) {
+                    continue;
+                }
+                let is_series = |i: usize| self.values.series(i).len() > 1;
+                let parts = match self.dag.ops[i] {
+                    Op::Multiply(a, b) => {
+                        let part = |(to, by): &(usize, usize)| !self.values.is_known(*to) && is_series(*by);
+                        [(a, b), (b, a)].iter().filter(|p| part(p)).count()
+                    }
+                    Op::Divide(a, b) => [a, b].iter().filter(|to| !self.values.is_known(**to)).count(),
+                    Op::Primitive { .. } => 1,
+                    _ => 0,
+                };
+                products += parts;
+                transforms += if parts > 0 { 1 + parts } else { 0 };
+            }
+        }
+        Some((transforms, products))
+    }
+
+    /// The Jacobian of the rates, if products with it take less than a sweep through the graph.
+    fn jacobian(&self) -> Option<Vec<Vec<JacobianEntry<S>>>> {
+        let (transforms, products) = self.sweep_size()?;
+        let rates = self.rates();
+        let mut columns: Vec<Vec<JacobianEntry<S>>> = vec![Vec::new(); self.signals.len()];
+        let (mut entries, n) = (0, self.length);
+        for &(row, rate) in &rates {
+            let mut one = vec![self.f.zero(); n];
+            one[0] = self.f.one();
+            for (column, series) in self.sweep(vec![(rate, one)], n).into_iter().enumerate() {
+                columns[column].extend(series.map(|series| (row, series)));
+            }
+            entries = columns.iter().map(Vec::len).sum();
+            if entries > products {
+                return None;
+            }
+        }
+        let sums = columns.iter().filter(|c| !c.is_empty()).count();
+        (rates.len() + sums + entries / 4 < transforms).then_some(columns)
+    }
+
+    /// Factors of the differentials of slots from those of the states, by the Jacobian.
+    fn by_jacobian(
+        &self,
+        columns: &[Vec<JacobianEntry<S>>],
+        held: &[Option<TaylorSeries<S>>],
+        n: usize,
+    ) -> Vec<Option<TaylorSeries<S>>> {
+        let of: Vec<Option<&[S::Element]>> = held.iter().map(|w| w.as_ref().map(|w| &w[..n])).collect();
+        // the same keys at every order
+        let mut keys = 0usize..;
+        let mut lists = Vec::with_capacity(columns.len());
+        for column in columns {
+            let entries = column.iter().zip(&mut keys);
+            lists.push(entries.map(|((row, series), key)| (*row, key, &series[..])).collect());
+        }
+        self.f.sums(&mut self.plan.borrow_mut(), &of, &lists, n)
     }
 
     /// Advances the differentials by one order.
@@ -143,12 +242,15 @@ impl<'a, S: Values> Adjoint<'a, S> {
                 (Some(w), Signal::State { rate }) => Some((*rate, w[..n].to_vec())),
                 _ => None,
             });
-            let mut out = self.sweep(seeds.collect(), n);
+            let mut out = match &self.jacobian {
+                Some(columns) => self.by_jacobian(columns, held, n),
+                None => self.sweep(seeds.collect(), n),
+            };
             for (next, w) in out.iter_mut().zip(held) {
                 let Some(w) = w else { continue };
                 let next = next.get_or_insert_with(|| vec![f.zero(); n]);
-                for (j, x) in next.iter_mut().enumerate() {
-                    *x = f.add(x, &f.mul(&f.integer(j as i64 + 1), &w[j + 1]));
+                for ((x, later), factor) in next.iter_mut().zip(&w[1..]).zip(&self.integers) {
+                    *x = f.add(x, &f.mul(factor, later));
                 }
             }
             out
@@ -267,14 +369,14 @@ impl<'a, S: Values> Adjoint<'a, S> {
         n: usize,
     ) -> Vec<TaylorSeries<S>> {
         let f = &self.f;
-        if factors.iter().all(|(_, b)| b.len() > 1) {
-            return f.products(&mut self.plan.borrow_mut(), w, factors, n);
-        }
-        let product = |&(key, b): &(usize, &[S::Element])| match *b {
-            [factor] => w[..n.min(w.len())].iter().map(|x| f.mul(x, &factor)).collect(),
-            _ => f.products(&mut self.plan.borrow_mut(), w, &[(key, b)], n).remove(0),
+        let series: Vec<_> =
+            factors.iter().filter(|(_, b)| b.len() > 1).map(|&(key, b)| vec![(0, key, b)]).collect();
+        let mut products = f.sums(&mut self.plan.borrow_mut(), &[Some(w)], &series, n).into_iter().flatten();
+        let product = |&(_, b): &(usize, &[S::Element])| match *b {
+            [factor] => Some(w[..n.min(w.len())].iter().map(|x| f.mul(x, &factor)).collect()),
+            _ => products.next(),
         };
-        factors.iter().map(product).collect()
+        factors.iter().filter_map(product).collect()
     }
 }
 

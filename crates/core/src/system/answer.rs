@@ -113,8 +113,9 @@ pub struct SystemAnalysis {
     /// 1971, doi:10.2307/1970774), so that random values in prime fields replace them; 0 for a rational
     /// model, null if functions were evaluated in real numbers.
     pub independent_functions: Option<usize>,
-    /// Random primes of the two prime fields, as text (61 bits); null for a model judged in real numbers.
-    pub primes: Option<[String; 2]>,
+    /// Random primes of the two prime fields, as text (61 bits), and a third one for a model so large that two
+    /// might be wrong with a probability above 1e-9; null for a model judged in real numbers.
+    pub primes: Option<Vec<String>>,
     /// Bound on the probability that a verdict is wrong; null for a model judged in real numbers.
     pub error_bound: Option<f64>,
     /// Margin of the rank decisions in real numbers; null for a model judged in prime fields.
@@ -487,7 +488,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
         solution_maps: Vec::new(),
         counting_order: None,
         independent_functions: judged.independent_functions,
-        primes: primes.map(|p| p.primes_as_text()),
+        primes: primes.map(|p| p.all_as_text()),
         error_bound: judged.error_bound(),
         digits: judged.digits(),
         seed: findings.seed,

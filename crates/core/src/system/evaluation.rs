@@ -5,7 +5,7 @@ use obsdeg_exact::{Ball, Field, Reals, Scalars, SplitMix64, Transform};
 use super::constraints::hold;
 use super::dag::Dag;
 use super::newton::hold_by_newton;
-use super::values::{ConstraintFailure, Values};
+use super::values::{ConstraintFailure, KeyedFactor, Values};
 use super::work::Work;
 use crate::language::{Function, from_i128};
 
@@ -26,14 +26,14 @@ impl Values for Field {
         Transform::new(*self, length)
     }
 
-    fn products(
+    fn sums<'a>(
         &self,
         plan: &mut Transform,
-        a: &[u64],
-        factors: &[(usize, &[u64])],
+        of: &[Option<&'a [u64]>],
+        lists: &[Vec<KeyedFactor<'a, u64>>],
         n: usize,
-    ) -> Vec<Vec<u64>> {
-        plan.products(a, factors, n)
+    ) -> Vec<Option<Vec<u64>>> {
+        plan.sums(of, lists, n)
     }
 
     fn number(&self, mantissa: i128, decimals: i32) -> u64 {
@@ -114,18 +114,25 @@ impl<const N: usize> Values for Reals<N> {
 
     fn plan(&self, _: usize) {}
 
-    fn products(
+    fn sums<'a>(
         &self,
         (): &mut (),
-        a: &[Ball<N>],
-        factors: &[(usize, &[Ball<N>])],
+        of: &[Option<&'a [Ball<N>]>],
+        lists: &[Vec<KeyedFactor<'a, Ball<N>>>],
         n: usize,
-    ) -> Vec<Vec<Ball<N>>> {
-        let product = |(_, b): &(usize, &[Ball<N>])| {
-            let terms = |k: usize| (0..=k).filter_map(move |j| Some((a.get(j)?, b.get(k - j)?)));
-            (0..n).map(|k| self.dot(&Ball::ZERO, terms(k))).collect()
+    ) -> Vec<Option<Vec<Ball<N>>>> {
+        let sum = |list: &Vec<KeyedFactor<'a, Ball<N>>>| {
+            let parts: Vec<(&'a [Ball<N>], &'a [Ball<N>])> =
+                list.iter().filter_map(|&(i, _, b)| Some((of[i]?, b))).collect();
+            let terms = |k: usize| {
+                let products = move |&(a, b): &(&'a [Ball<N>], &'a [Ball<N>])| {
+                    (0..=k).filter_map(move |j| Some((a.get(j)?, b.get(k - j)?)))
+                };
+                parts.iter().flat_map(products)
+            };
+            (!parts.is_empty()).then(|| (0..n).map(|k| self.dot(&Ball::ZERO, terms(k))).collect())
         };
-        factors.iter().map(product).collect()
+        lists.iter().map(sum).collect()
     }
 
     fn number(&self, mantissa: i128, decimals: i32) -> Ball<N> {

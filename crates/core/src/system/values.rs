@@ -34,6 +34,9 @@ impl From<Refused> for ConstraintFailure {
     }
 }
 
+/// Index of a series, and the factor of it with its key.
+pub(crate) type KeyedFactor<'a, E> = (usize, usize, &'a [E]);
+
 /// Field in which a model has values.
 pub(crate) trait Values: Scalars {
     /// Number of points tried before an undefined expression counts as undefined everywhere.
@@ -48,15 +51,15 @@ pub(crate) trait Values: Scalars {
 
     /// Plan for series of this length.
     fn plan(&self, length: usize) -> Self::Plan;
-    /// First `n` coefficients of the product of a series with each of several others, which the plan knows
-    /// by their keys.
-    fn products(
+    /// For each list of `(index, key, factor)` the first `n` coefficients of the sum of the products of
+    /// `of[index]` and the factor, which the plan knows by its key; `None` if there is none of these.
+    fn sums<'a>(
         &self,
         plan: &mut Self::Plan,
-        a: &[Self::Element],
-        factors: &[(usize, &[Self::Element])],
+        of: &[Option<&'a [Self::Element]>],
+        lists: &[Vec<KeyedFactor<'a, Self::Element>>],
         n: usize,
-    ) -> Vec<Vec<Self::Element>>;
+    ) -> Vec<Option<Vec<Self::Element>>>;
     /// Decimal `mantissa / 10^decimals`.
     fn number(&self, mantissa: i128, decimals: i32) -> Self::Element;
     /// Number pi.
