@@ -1255,8 +1255,10 @@ class SystemAnalysis(Shape):
     """Number of functions whose values are proven to be independent of each other at a generic point (Ax 1971, doi:10.2307/1970774), so
     that random values in prime fields replace them; 0 for a rational model, null if functions were evaluated in real numbers.
     """
-    primes: tuple[str, str] | None
-    """Random primes of the two prime fields, as text (61 bits); null for a model judged in real numbers."""
+    primes: list[str] | None
+    """Random primes of the two prime fields, as text (61 bits), and a third one for a model so large that two might be wrong with a
+    probability above 1e-9; null for a model judged in real numbers.
+    """
     error_bound: float | None
     """Bound on the probability that a verdict is wrong; null for a model judged in real numbers."""
     digits: DigitsReport | None

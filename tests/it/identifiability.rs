@@ -284,6 +284,32 @@ fn functions_of_other_factors_by_hand() {
         ),
         // y' = w + a, y'' = w' + b, y''' = w'' + q
         (derivatives, vec![("a + w", 1), ("b + w'", 2), ("q + w''", 3)]),
+        // functions of a multiple are written by those of the unknown, in the answer too
+        (
+            "z='0'\n[parameters]\na={}\nc={}\nd={}\n[outputs]\ny='tanh(a)*c'\nv='exp(-a)*d'",
+            vec![("c*tanh(a)", 0), ("d/exp(a)", 0)],
+        ),
+        // of an arbitrary input the signal itself, not its derivatives
+        (
+            "z='0'\n[parameters]\na={}\nb={}\n[unknown_inputs]\nw='arbitrary'\n[outputs]\ny='a*(b + w)'",
+            vec![("a*(b + w)", 0)],
+        ),
+        // the fourth derivative is no power
+        (
+            "z='a*w'\n[parameters]\na={}\n[unknown_inputs]\nw={ polynomial = 4 }\n[outputs]\ny='z'",
+            vec![("a*w", 1), ("a*w'", 2), ("a*w''", 3), ("a*w'''", 4), ("a*w''''", 5)],
+        ),
+        // a known input that is linear in time, and its derivative
+        (
+            "x='a*u + c*w'\n[parameters]\na={}\nc={}\n[known_inputs]\nu={ polynomial = 1 }\n[unknown_inputs]\n\
+             w={ polynomial = 1 }\n[outputs]\ny='x'",
+            vec![("a*u + c*w", 1), ("a*u' + c*w'", 2)],
+        ),
+        // an exponential of an unknown input
+        (
+            "x='k*exp(w)'\n[parameters]\nk={}\n[unknown_inputs]\nw='constant'\n[outputs]\ny='x'",
+            vec![("k*exp(w)", 1)],
+        ),
     ];
     for (text, functions) in cases {
         let a = of(text);

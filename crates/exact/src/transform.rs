@@ -152,9 +152,9 @@ impl Transform {
         [first, first / 2].map(|block| self.f.inv(self.f.from_u64(block)))
     }
 
-    /// Values of a polynomial of at most `size / 2` coefficients, below 2p: at the powers of the root of order
-    /// `size` if that is a power of two. Of `3 M / 2` values, M are at the powers of the root of order M, and the
-    /// rest at the zeros of `x^(M/2) - i`, with `i^2 = -1`.
+    /// Values of a polynomial of at most `size / 2` coefficients, below 2p: at the powers of the root of
+    /// order `size` if that is a power of two. Of `3 M / 2` values, M are at the powers of the root of order
+    /// M, and the rest at the zeros of `x^(M/2) - i`, with `i^2 = -1`.
     fn spectrum(&self, a: &[u64], size: usize) -> Vec<u64> {
         let (f, p) = (&self.f, self.f.modulus());
         let first = first_block(size);
@@ -186,8 +186,8 @@ impl Transform {
         self.backward(low);
         if size > first {
             self.backward(rest);
-            // C = A modulo x^M - 1 and B modulo x^(M/2) - i: with A = A' + x^(M/2) A'' the first M/2 coefficients are
-            // those of (A' - i A'' + B)/2
+            // C = A modulo x^M - 1 and B modulo x^(M/2) - i: with A = A' + x^(M/2) A'' the first M/2
+            // coefficients are those of (A' - i A'' + B)/2
             let half = first / 2;
             let level = first.trailing_zeros() as usize;
             let (i, inverses) = (self.roots[level][half], &self.inverses[level]);

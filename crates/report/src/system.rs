@@ -218,12 +218,15 @@ fn directions(a: &SystemAnalysis) -> Option<DocumentBlock> {
 fn assumed(a: &SystemAnalysis) -> Vec<String> {
     let mut assumed = Vec::new();
     if a.missing_functions > 0 {
-        assumed.push(format!(
-            "identifiable combinations are not all listed: {} independent one{} more of unobservable \
-             unknowns exist, and no short sum of products of powers was found",
-            a.missing_functions,
-            if a.missing_functions == 1 { "" } else { "s" }
-        ));
+        let number = match a.missing_functions {
+            1 => "1 more independent one exists".to_string(),
+            n => format!("{n} more independent ones exist"),
+        };
+        let why = match a.digits {
+            Some(_) => "for a model judged in real numbers only those of its symmetries are sought",
+            None => "none was found among short sums of products of powers",
+        };
+        assumed.push(format!("identifiable combinations are not all listed: {number}; {why}"));
     }
     if !a.known.is_empty() {
         assumed.push(format!("known starts: {}", a.known.join(", ")));

@@ -504,7 +504,7 @@ impl<'a> Calibrating<'a> {
         x: &DVector<f64>,
     ) -> Result<Vec<OfInvariant>, ModelError> {
         let found = symmetries(self.model, self.compiled, judged, self.options.seed)?;
-        let reports = invariant_reports(self.model, judged, &found);
+        let reports = invariant_reports(judged, &found);
         let of = |(i, report): (&obsdeg_core::system::Invariant, obsdeg_core::system::SystemCombination)| {
             let place = |&(c, m): &(usize, i64)| {
                 let name = &judged.layout.unknowns[c].name;

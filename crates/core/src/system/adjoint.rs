@@ -164,8 +164,8 @@ impl<'a, S: Values> Adjoint<'a, S> {
         self.signals.iter().enumerate().filter_map(rate).collect()
     }
 
-    /// Numbers of series that a sweep from all rates transforms and multiplies; `None` if the nodes below each
-    /// rate are many together.
+    /// Numbers of series that a sweep from all rates transforms and multiplies; `None` if the nodes below
+    /// each rate are many together.
     fn sweep_size(&self) -> Option<(usize, usize)> {
         let (mut transforms, mut products, mut nodes) = (0, 0, 0);
         let mut counted = vec![false; self.dag.ops.len()];

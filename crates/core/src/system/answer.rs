@@ -9,7 +9,7 @@ use super::counts::{CountLimits, SolutionCount, Solutions, values_taken};
 use super::error::ModelError;
 use super::function_factors::Factors;
 use super::functions::gcd;
-use super::identifiable::{identifiable_functions, terms_of};
+use super::identifiable::{IdentifiableFunctions, identifiable_functions, terms_of};
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
 use super::model::{Compiled, Role, StartTime, StateStart, SystemModel};
 use super::quotients::Terms;
@@ -113,8 +113,8 @@ pub struct SystemAnalysis {
     /// 1971, doi:10.2307/1970774), so that random values in prime fields replace them; 0 for a rational
     /// model, null if functions were evaluated in real numbers.
     pub independent_functions: Option<usize>,
-    /// Random primes of the two prime fields, as text (61 bits), and a third one for a model so large that two
-    /// might be wrong with a probability above 1e-9; null for a model judged in real numbers.
+    /// Random primes of the two prime fields, as text (61 bits), and a third one for a model so large that
+    /// two might be wrong with a probability above 1e-9; null for a model judged in real numbers.
     pub primes: Option<Vec<String>>,
     /// Bound on the probability that a verdict is wrong; null for a model judged in real numbers.
     pub error_bound: Option<f64>,
@@ -321,8 +321,9 @@ impl Default for SystemOptions {
 pub(super) struct Analyzed {
     pub(super) analysis: SystemAnalysis,
     pub(super) judged: Judgement,
-    /// Identifiable functions, in the order of the invariants of the analysis.
+    /// Identifiable functions, in the order of the invariants of the analysis, and their factors.
     pub(super) functions: Vec<Terms>,
+    pub(super) factors: Factors,
 }
 
 /// Analysis of a model in continuous time.
@@ -333,8 +334,8 @@ pub(super) fn analyzed(model: &SystemModel, options: SystemOptions) -> Result<An
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let mut out = answer(model, &judged, &symmetries);
     out.note = symmetries.stopped.clone();
-    let (functions, missing) = identifiable_functions(model, &compiled, &judged, &symmetries, seed)?;
-    let factors = Factors::new(model, &compiled, &judged.layout);
+    let IdentifiableFunctions { found: functions, missing, factors } =
+        identifiable_functions(model, &compiled, &judged, &symmetries, seed)?;
     let name = |c: usize| factors.name(c, model, &judged.layout);
     out.invariants.extend(functions.iter().map(|f| SystemCombination {
         expression: f.text(&name),
@@ -351,7 +352,7 @@ pub(super) fn analyzed(model: &SystemModel, options: SystemOptions) -> Result<An
         time => time.number().to_string(),
     });
     if !options.solutions {
-        return Ok(Analyzed { analysis: out, judged, functions: listed });
+        return Ok(Analyzed { analysis: out, judged, functions: listed, factors });
     }
     let limits = CountLimits {
         count: options.count_limit.saturating_mul(1_000_000),
@@ -380,7 +381,7 @@ pub(super) fn analyzed(model: &SystemModel, options: SystemOptions) -> Result<An
     }
     let counted = |q: &SystemQuantity| matches!(q.number_of_solutions, Some(NumberOfSolutions::Counted(_)));
     out.counting_order = out.quantities.iter().any(counted).then_some(counting_order);
-    Ok(Analyzed { analysis: out, judged, functions: listed })
+    Ok(Analyzed { analysis: out, judged, functions: listed, factors })
 }
 
 /// Name of the output that equals a state, or of the output derivative that equals it: `y`, `y'`, `y''`;
@@ -472,7 +473,7 @@ fn answer(model: &SystemModel, judged: &Judgement, symmetries: &Symmetries) -> S
             .collect(),
         unobservable_directions: judged.layout.unknowns.len() - findings.degrees.rank(),
         other_directions: named(&symmetries.unexplained, &name),
-        invariants: invariant_reports(model, judged, symmetries),
+        invariants: invariant_reports(judged, symmetries),
         missing_functions: 0,
         symmetries: symmetry_reports(model, judged, symmetries),
         last_order: findings.degrees.rank_profile.len().saturating_sub(1),
@@ -508,8 +509,9 @@ fn named(list: &[Vec<usize>], name: &dyn Fn(usize) -> String) -> Vec<Vec<String>
 }
 
 /// `c`, or a similar name that the model does not use.
-fn free_name(judged: &Judgement) -> String {
-    let taken = |name: &str| judged.layout.unknowns.iter().any(|u| u.name == name);
+fn free_name(model: &SystemModel) -> String {
+    let own = model.slot_names();
+    let taken = |name: &str| own.iter().any(|n| n == name);
     ["c", "s", "k", "factor"].into_iter().find(|n| !taken(n)).unwrap_or("factor_").into()
 }
 
@@ -519,7 +521,7 @@ pub fn symmetry_reports(
     judged: &Judgement,
     symmetries: &Symmetries,
 ) -> Vec<SymmetryReport> {
-    let c = free_name(judged);
+    let c = free_name(model);
     let name = &|c: usize| name_of(model, judged, c);
     let plain = symmetries.found.iter().map(|s| SymmetryReport {
         words: words(s, &c, name),
@@ -630,12 +632,8 @@ fn words(s: &Symmetry, c: &str, name: &dyn Fn(usize) -> String) -> String {
 }
 
 /// Observable combinations of unobservable unknowns in words, in the order of `symmetries.invariants`.
-pub fn invariant_reports(
-    model: &SystemModel,
-    judged: &Judgement,
-    symmetries: &Symmetries,
-) -> Vec<SystemCombination> {
-    let name = |c: usize| name_of(model, judged, c);
+pub fn invariant_reports(judged: &Judgement, symmetries: &Symmetries) -> Vec<SystemCombination> {
+    let name = |c: usize| judged.layout.unknowns[c].in_formulas();
     let product = |i: &Invariant| {
         let power = |&(c, m): &(usize, i64)| match m.abs() {
             1 => name(c),

@@ -5,7 +5,6 @@ use std::collections::HashSet;
 
 use super::answer::{Analyzed, NumberOfSolutions, SystemAnalysis, SystemOptions, SystemQuantity, analyzed};
 use super::error::ModelError;
-use super::function_factors::Factors;
 use super::judge::{Judgement, judge};
 use super::model::{
     Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StartTime, StateStart, SystemModel,
@@ -406,10 +405,9 @@ pub(super) fn analyze_discrete(
     let last = ranks.len() - 1;
     let mut whole = model.unrolled(last)?;
     let options_of_steps = SystemOptions { order: None, ..options };
-    let Analyzed { analysis: mut out, judged, functions } = analyzed(&whole, options_of_steps)?;
+    let Analyzed { analysis: mut out, judged, functions, factors } = analyzed(&whole, options_of_steps)?;
     let further = recount(model, &mut out, last, options_of_steps)?;
     let asked = whole.combinations.len();
-    let factors = Factors::new(&whole, &whole.compile()?, &judged.layout);
     // combinations are those of the first experiment, where names have no number
     let plain = |c: usize| factors.name(c, &whole, &judged.layout).trim_end_matches("@1").to_string();
     let factor = |c: usize| match factors.function(c) {

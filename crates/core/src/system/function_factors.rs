@@ -18,40 +18,41 @@ pub(super) struct UnknownFunction {
     weight: usize,
 }
 
-/// Factors in the order of their numbers: unknowns, known constants, constant known inputs, functions of one
-/// unknown.
+/// Factors in the order of their numbers: unknowns, known constants, known inputs that are polynomials in
+/// time with their derivatives, functions of one unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Factors {
     pub(super) unknowns: usize,
     pub(super) constants: usize,
-    /// Known inputs that are constant.
-    pub(super) inputs: Vec<usize>,
+    /// Known inputs, each with the order of its derivative.
+    pub(super) inputs: Vec<(usize, usize)>,
     pub(super) functions: Vec<UnknownFunction>,
 }
 
 impl Factors {
-    /// Factors of a model. With several experiments there are unknowns and constants only, as the others
+    /// Factors of a model. With several experiments there are no inputs and no functions of states, as these
     /// differ between experiments.
     pub(super) fn new(model: &SystemModel, compiled: &Compiled, layout: &Layout) -> Self {
-        let mut out = Self {
-            unknowns: layout.unknowns.len(),
-            constants: model.constants.len(),
-            inputs: Vec::new(),
-            functions: Vec::new(),
+        let one = model.experiments <= 1;
+        let derivatives = |i: usize| match model.known_input(0, i) {
+            KnownInput::Polynomial(degree) if one => (0..=*degree).map(|k| (i, k)).collect(),
+            _ => Vec::new(),
         };
-        if model.experiments > 1 {
-            return out;
-        }
-        let is_constant = |i: &usize| matches!(model.known_input(0, *i), KnownInput::Polynomial(0));
-        out.inputs = (0..model.known_inputs.len()).filter(is_constant).collect();
         let function = |(node, op): (usize, &Op)| {
             let Op::Primitive { function, of, weight } = *op else { return None };
             let Op::Slot(slot) = compiled.dag.ops[of] else { return None };
-            let role @ (Role::State(_) | Role::Parameter(_)) = compiled.roles[slot] else { return None };
-            Some(UnknownFunction { function, lane: layout.lane(role, 0)?, node, weight })
+            let role = compiled.roles[slot];
+            let is_unknown = matches!(role, Role::Parameter(_))
+                || one && matches!(role, Role::State(_) | Role::UnknownInput(_));
+            let lane = layout.lane(role, 0).filter(|_| is_unknown)?;
+            Some(UnknownFunction { function, lane, node, weight })
         };
-        out.functions = compiled.dag.ops.iter().enumerate().filter_map(function).collect();
-        out
+        Self {
+            unknowns: layout.unknowns.len(),
+            constants: model.constants.len(),
+            inputs: (0..model.known_inputs.len()).flat_map(derivatives).collect(),
+            functions: compiled.dag.ops.iter().enumerate().filter_map(function).collect(),
+        }
     }
 
     /// Number of factors.
@@ -59,13 +60,15 @@ impl Factors {
         self.unknowns + self.constants + self.inputs.len() + self.functions.len()
     }
 
-    /// Nodes whose values at a point follow those of the unknowns: known values, functions, and the
-    /// derivatives of the functions. `None` for a value that the model does not use.
-    pub(super) fn nodes(&self, compiled: &Compiled) -> Vec<Option<usize>> {
-        let constants = (0..self.constants).map(|c| compiled.node_of(Role::Constant(c)));
-        let inputs = self.inputs.iter().map(|&i| compiled.node_of(Role::KnownInput(i)));
-        let functions = self.functions.iter().map(|f| Some(f.node));
-        let weights = self.functions.iter().map(|f| Some(f.weight));
+    /// Nodes whose values at a point follow those of the unknowns, each with an order of differentiation:
+    /// known values, functions, and the derivatives of the functions. `None` for a value that the model does
+    /// not use.
+    pub(super) fn nodes(&self, compiled: &Compiled) -> Vec<Option<(usize, usize)>> {
+        let known = |role: Role, order: usize| Some((compiled.node_of(role)?, order));
+        let constants = (0..self.constants).map(|c| known(Role::Constant(c), 0));
+        let inputs = self.inputs.iter().map(|&(i, order)| known(Role::KnownInput(i), order));
+        let functions = self.functions.iter().map(|f| Some((f.node, 0)));
+        let weights = self.functions.iter().map(|f| Some((f.weight, 0)));
         constants.chain(inputs).chain(functions).chain(weights).collect()
     }
 
@@ -84,15 +87,19 @@ impl Factors {
         if factor < self.unknowns { Some(factor) } else { self.function(factor).map(|f| f.lane) }
     }
 
-    /// Number of the factor with a role; `None` if there is none.
-    pub(super) fn of_role(&self, role: Role, layout: &Layout) -> Option<usize> {
+    /// Number of the factor with a role in an experiment; `None` if there is none.
+    pub(super) fn of_role(&self, role: Role, layout: &Layout, experiment: usize) -> Option<usize> {
         match role {
             Role::Constant(c) => Some(self.unknowns + c),
-            Role::KnownInput(i) => {
-                Some(self.unknowns + self.constants + self.inputs.iter().position(|&own| own == i)?)
-            }
-            role => layout.lane(role, 0),
+            Role::KnownInput(i) => self.of_input(i, 0),
+            role => layout.lane(role, experiment),
         }
+    }
+
+    /// Number of the derivative of a known input; `None` if it is no factor.
+    pub(super) fn of_input(&self, input: usize, order: usize) -> Option<usize> {
+        let place = self.inputs.iter().position(|&own| own == (input, order))?;
+        Some(self.unknowns + self.constants + place)
     }
 
     /// Derivative of a factor by its unknown, given the values at a point.
@@ -108,13 +115,16 @@ impl Factors {
     pub(super) fn name(&self, factor: usize, model: &SystemModel, layout: &Layout) -> String {
         if let Some(f) = self.function(factor) {
             let named = Function::ALL.iter().find(|(_, function)| *function == f.function);
-            return format!("{}({})", named.map_or("", |n| n.0), layout.unknowns[f.lane].name);
+            return format!("{}({})", named.map_or("", |n| n.0), layout.unknowns[f.lane].in_formulas());
         }
         let constant = factor.checked_sub(self.unknowns);
         match constant.map(|c| c.checked_sub(self.constants).ok_or(c)) {
-            None => layout.unknowns[factor].name.clone(),
+            None => layout.unknowns[factor].in_formulas(),
             Some(Err(c)) => model.constants[c].0.name.clone(),
-            Some(Ok(i)) => model.known_inputs[self.inputs[i]].0.name.clone(),
+            Some(Ok(i)) => {
+                let (input, order) = self.inputs[i];
+                format!("{}{}", model.known_inputs[input].0.name, "'".repeat(order))
+            }
         }
     }
 }

@@ -16,8 +16,8 @@ use super::work::{Spent, Work};
 pub enum OutputRows {
     /// Rows in two prime fields.
     Primes(Box<[PointRows<Field>; 2]>),
-    /// Rows in real numbers of 154 and 308 digits.
-    Digits(Box<(PointRows<Reals<8>>, PointRows<Reals<16>>)>),
+    /// Rows in real numbers of 192 and 308 digits.
+    Digits(Box<(PointRows<Reals<10>>, PointRows<Reals<16>>)>),
 }
 
 /// Rows of every output of a model, and the verdicts on all outputs together.
@@ -71,8 +71,8 @@ impl Gathered {
 pub(super) enum RunOutputRows {
     /// In two prime fields.
     Primes([Vec<PointRows<Field>>; 2]),
-    /// In real numbers of 154 and 308 digits.
-    Digits(Vec<PointRows<Reals<8>>>, Vec<PointRows<Reals<16>>>),
+    /// In real numbers of 192 and 308 digits.
+    Digits(Vec<PointRows<Reals<10>>>, Vec<PointRows<Reals<16>>>),
 }
 
 /// Gathers the rows of every output of a judged model, run by run, and the order of the roots of unity of the
@@ -105,7 +105,7 @@ pub(super) fn gather_runs(
         }
         SystemCertainty::Digits(_) => {
             let mut rng = model.random(seed, &format!("rows of outputs, attempt {attempt}"));
-            let first = rows_at(model, compiled, layout, Reals::<8>, &mut rng)?;
+            let first = rows_at(model, compiled, layout, Reals::<10>, &mut rng)?;
             Ok((RunOutputRows::Digits(first, rows_at(model, compiled, layout, Reals::<16>, &mut rng)?), 1))
         }
     }

@@ -51,6 +51,15 @@ pub(super) struct IdentifiableFunction {
     pub(super) degree: usize,
 }
 
+/// Identifiable functions beyond the invariants of the symmetries.
+pub(super) struct IdentifiableFunctions {
+    pub(super) found: Vec<IdentifiableFunction>,
+    /// Number of independent ones that were not found.
+    pub(super) missing: usize,
+    /// Factors of the functions.
+    pub(super) factors: Factors,
+}
+
 /// Functions beyond the invariants of the symmetries, and the number of missing ones.
 ///
 /// # Errors
@@ -61,16 +70,19 @@ pub(super) fn identifiable_functions(
     judged: &Judgement,
     symmetries: &Symmetries,
     seed: u64,
-) -> Result<(Vec<IdentifiableFunction>, usize), ModelError> {
+) -> Result<IdentifiableFunctions, ModelError> {
     let degrees = &judged.findings.degrees;
     let shown: Vec<bool> = (0..degrees.degree.len()).map(|c| judged.shown(model, c)).collect();
     let observable = degrees.degree.iter().zip(&shown).filter(|(d, shown)| d.is_some() && **shown).count();
     let number = |all: usize| all.saturating_sub(observable + symmetries.invariants.len());
     let missing = number(judged.span.as_ref().map_or(degrees.rank(), |span| of_shown(span, &shown)));
-    let Some([f, other]) = fields(judged).filter(|_| missing > 0) else { return Ok((Vec::new(), missing)) };
     // values of functions in a field are independent of each other if functions of sums are written apart
     let apart = if judged.fields.is_some() { None } else { written_apart(compiled) };
     let compiled = apart.as_ref().unwrap_or(compiled);
+    let Some([f, other]) = fields(judged).filter(|_| missing > 0) else {
+        let factors = Factors::new(model, compiled, &judged.layout);
+        return Ok(IdentifiableFunctions { found: Vec::new(), missing, factors });
+    };
     let mut search = FunctionSearch::new(model, compiled, judged, f, seed)?;
     (search.all, search.shown) = (of_shown(&search.first().span, &shown), shown);
     let listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
@@ -102,9 +114,7 @@ pub(super) fn identifiable_functions(
     if search.missing() > 0 {
         search.among_derivatives(&listed)?;
     }
-    let missing = search.missing();
-    let found = search.verified(other)?;
-    Ok((found.0, missing + found.1))
+    search.verified(other)
 }
 
 /// The two prime fields of the verdicts; `None` if real numbers decided.
@@ -272,9 +282,16 @@ impl<'a> FunctionSearch<'a> {
     /// unknowns, and of the functions found. The derivative of an identifiable function is identifiable, and
     /// so is the coefficient of every product of inputs in it.
     fn among_derivatives(&mut self, listed: &[Terms]) -> Result<(), ModelError> {
-        let motion = Motion::new(self.model, self.compiled, self.judged, &self.factors, self.f);
-        let Some(motion) = motion else { return Ok(()) };
         self.spent = Spent::default();
+        for experiment in 0..self.model.experiments.max(1) {
+            let system = (self.model, self.compiled, self.judged);
+            let motion = Motion::new(system, &self.factors, self.f, experiment);
+            self.among_derivatives_along(&motion, listed)?;
+        }
+        Ok(())
+    }
+
+    fn among_derivatives_along(&mut self, motion: &Motion, listed: &[Terms]) -> Result<(), ModelError> {
         let degrees = &self.judged.findings.degrees.degree;
         let observable = (0..degrees.len()).filter(|&c| degrees[c].is_some() && self.shown[c]);
         let mut open: Vec<LaurentPolynomial> = observable.map(|c| variable(&self.f, c)).collect();
@@ -352,18 +369,17 @@ impl<'a> FunctionSearch<'a> {
         left
     }
 
-    /// Functions that are identifiable at a point of another field too, and the number of those that are
-    /// not.
-    fn verified(self, other: Field) -> Result<(Vec<IdentifiableFunction>, usize), ModelError> {
+    /// Functions that are identifiable at a point of another field too; the others count as missing.
+    fn verified(self, other: Field) -> Result<IdentifiableFunctions, ModelError> {
         let mut rng = self.rng.clone();
         let spent = &mut Spent::default();
         let at = climb_at(self.model, self.compiled, &self.judged.layout, other, &mut rng, spent)?;
-        let all = self.found.len();
+        let all = self.missing() + self.found.len();
         let holds =
             |i: &IdentifiableFunction| at.span.contains(&gradient(&other, &self.factors, &i.terms, &at));
         let found: Vec<IdentifiableFunction> = self.found.into_iter().filter(holds).collect();
-        let lost = all - found.len();
-        Ok((found, lost))
+        let missing = all - found.len();
+        Ok(IdentifiableFunctions { found, missing, factors: self.factors })
     }
 }
 

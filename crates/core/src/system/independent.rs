@@ -86,11 +86,11 @@ fn is_somewhere(
     rng: &mut SplitMix64,
     work: &Work,
 ) -> bool {
-    let field = Reals::<4>;
+    let field = Reals::<2>;
     let builder = PointBuilder { model, compiled, layout, field, work };
     let roots: Vec<usize> =
         compiled.rates(0).iter().chain(compiled.outputs(0)).chain(&compiled.combinations).copied().collect();
-    (0..<Reals<4> as Values>::ATTEMPTS).any(|attempt| {
+    (0..<Reals<2> as Values>::ATTEMPTS).any(|attempt| {
         let Some(values) = builder.values(rng, attempt) else { return false };
         let starts = vec![None; values.len()];
         let signals = values.into_iter().map(|value| Signal::Constant { value, lane: None }).collect();

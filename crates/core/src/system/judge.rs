@@ -241,7 +241,11 @@ fn climbed<S: Values>(
         })
         .collect();
     let rows = rows.rows;
-    let mut values = rows.values(compiled, layout, &Factors::new(model, compiled, layout).nodes(compiled));
+    let nodes = Factors::new(model, compiled, layout).nodes(compiled);
+    for (node, order) in nodes.iter().flatten().filter(|n| n.1 > 0) {
+        rows.coefficient(0, *node, *order);
+    }
+    let mut values = rows.values(compiled, layout, &nodes);
     for (lane, _) in &scales {
         values[*lane] = field.mul(&values[*lane], &layout.factorial(&field, *lane));
     }
@@ -600,7 +604,7 @@ fn judge_by_digits(
 ) -> Result<Judgement, ModelError> {
     let before = spent.operations;
     let mut reason = String::new();
-    for pair in [pair::<4, 8>, pair::<8, 16>, pair::<16, 32>] {
+    for pair in [pair::<4, 6>, pair::<6, 10>, pair::<10, 16>, pair::<16, 32>] {
         match pair(model, compiled, layout, seed, spent)? {
             Ok(judged) => return Ok(Judgement { work: spent.operations - before, ..judged }),
             Err(why) => reason = why,

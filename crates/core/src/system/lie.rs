@@ -17,6 +17,10 @@ use super::values::Values;
 /// Largest number of terms of a polynomial that is formed, and of a function that is returned.
 const FORMED: usize = 2000;
 const GIVEN: usize = 40;
+/// Largest number of terms of the polynomials of all nodes together.
+const ALL: usize = 500_000;
+/// Largest exponent of a polynomial that is formed.
+const EXPONENT: i32 = 1000;
 
 /// Sum of products of powers with coefficients in a prime field, none of which is zero.
 pub(super) type LaurentPolynomial = BTreeMap<QuotientPowers, u64>;
@@ -34,7 +38,7 @@ fn add_product(
     }
     for (first, x) in a {
         for (second, y) in b {
-            let entry = sum.entry(multiplied(first, second)).or_insert(0);
+            let entry = sum.entry(multiplied(first, second)?).or_insert(0);
             *entry = f.add(*entry, f.mul(c, f.mul(*x, *y)));
         }
     }
@@ -42,8 +46,8 @@ fn add_product(
     (sum.len() <= FORMED).then_some(())
 }
 
-/// Product of two products of powers.
-fn multiplied(a: &[(usize, i32)], b: &[(usize, i32)]) -> QuotientPowers {
+/// Product of two products of powers; `None` if an exponent is too large.
+fn multiplied(a: &[(usize, i32)], b: &[(usize, i32)]) -> Option<QuotientPowers> {
     let mut out = a.to_vec();
     for &(v, e) in b {
         match out.iter_mut().find(|p| p.0 == v) {
@@ -53,7 +57,7 @@ fn multiplied(a: &[(usize, i32)], b: &[(usize, i32)]) -> QuotientPowers {
     }
     out.retain(|p| p.1 != 0);
     out.sort_unstable();
-    out
+    out.iter().all(|p| p.1.abs() <= EXPONENT).then_some(out)
 }
 
 fn constant(f: &Field, c: u64) -> LaurentPolynomial {
@@ -78,25 +82,26 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// The motion of a model with one experiment; `None` with several.
+    /// The motion of an experiment of a model: states of the others stand still.
     pub(super) fn new(
-        model: &SystemModel,
-        compiled: &Compiled,
-        judged: &Judgement,
+        system: (&SystemModel, &Compiled, &Judgement),
         factors: &Factors,
         f: Field,
-    ) -> Option<Self> {
-        if model.experiments > 1 {
-            return None;
-        }
+        experiment: usize,
+    ) -> Self {
+        let (model, compiled, judged) = system;
         let layout = &judged.layout;
-        let nodes = nodes(model, compiled, judged, factors, &f);
+        let nodes = nodes(system, factors, &f, experiment);
         let next = |u: &Unknown| {
-            let is_next = |other: &Unknown| other.role == u.role && other.derivative == u.derivative + 1;
+            let is_next = |other: &Unknown| {
+                (other.role, other.experiment) == (u.role, u.experiment)
+                    && other.derivative == u.derivative + 1
+            };
             layout.unknowns.iter().position(is_next)
         };
         let rate = |u: &Unknown| match u.role {
-            Role::State(s) => nodes[compiled.rates(0)[s]].clone(),
+            _ if u.experiment.is_some_and(|e| e != experiment) => Some(LaurentPolynomial::new()),
+            Role::State(s) => nodes[compiled.rates(experiment)[s]].clone(),
             Role::UnknownInput(i) => match next(u) {
                 Some(next) => Some(variable(&f, next)),
                 None => model.unknown_inputs[i].1.map(|_| LaurentPolynomial::new()),
@@ -104,18 +109,26 @@ impl Motion {
             _ => Some(LaurentPolynomial::new()),
         };
         let mut rates: Vec<Option<LaurentPolynomial>> = layout.unknowns.iter().map(rate).collect();
-        rates.resize(factors.of_functions().start, Some(LaurentPolynomial::new()));
+        rates.resize(factors.unknowns + factors.constants, Some(LaurentPolynomial::new()));
+        rates.extend(factors.inputs.iter().map(|&(i, order)| {
+            Some(
+                factors.of_input(i, order + 1).map_or_else(LaurentPolynomial::new, |next| variable(&f, next)),
+            )
+        }));
         for own in &factors.functions {
-            let Op::Primitive { weight, .. } = compiled.dag.ops[own.node] else { return None };
-            let product = nodes[weight].as_ref().zip(rates[own.lane].as_ref()).and_then(|(weight, rate)| {
+            let weight = match compiled.dag.ops[own.node] {
+                Op::Primitive { weight, .. } => nodes[weight].as_ref(),
+                _ => None,
+            };
+            let product = weight.zip(rates[own.lane].as_ref()).and_then(|(weight, rate)| {
                 let mut product = LaurentPolynomial::new();
                 add_product(&f, &mut product, weight, rate, f.one())?;
                 Some(product)
             });
             rates.push(product);
         }
-        let outputs = compiled.outputs(0).iter().filter_map(|&o| nodes[o].clone()).collect();
-        Some(Self { f, rates, factors: factors.len(), outputs })
+        let outputs = compiled.outputs(experiment).iter().filter_map(|&o| nodes[o].clone()).collect();
+        Self { f, rates, factors: factors.len(), outputs }
     }
 
     /// Derivative of a polynomial in the factors; `None` if it is not formed.
@@ -125,7 +138,7 @@ impl Motion {
         for (powers, &x) in p {
             for &(v, e) in powers {
                 let rate = self.rates[v].as_ref()?;
-                let lower = LaurentPolynomial::from([(multiplied(powers, &[(v, -1)]), x)]);
+                let lower = LaurentPolynomial::from([(multiplied(powers, &[(v, -1)])?, x)]);
                 add_product(f, &mut out, &lower, rate, f.from_i64(e.into()))?;
             }
         }
@@ -151,13 +164,17 @@ impl Motion {
 
 /// Every node as a polynomial in factors and inputs; `None` for another node.
 fn nodes(
-    model: &SystemModel,
-    compiled: &Compiled,
-    judged: &Judgement,
+    (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
     factors: &Factors,
     f: &Field,
+    experiment: usize,
 ) -> Vec<Option<LaurentPolynomial>> {
+    let own_constant = |c: usize| {
+        let name = &model.constants[c].0.name;
+        model.own.iter().any(|own| own.constants.iter().any(|(changed, _)| changed == name))
+    };
     let mut out: Vec<Option<LaurentPolynomial>> = Vec::with_capacity(compiled.dag.ops.len());
+    let mut left = ALL;
     for (node, op) in compiled.dag.ops.iter().enumerate() {
         let sum = |a: usize, b: usize, sign: u64| {
             let (a, b) = (out[a].as_ref()?, out[b].as_ref()?);
@@ -173,10 +190,12 @@ fn nodes(
         let own = match *op {
             Op::Number { mantissa, decimals } => Some(constant(f, f.number(mantissa, decimals))),
             Op::Slot(slot) => match compiled.roles[slot] {
-                Role::KnownInput(i) if matches!(model.known_input(0, i), KnownInput::Generic) => {
+                Role::KnownInput(i) if matches!(model.known_input(experiment, i), KnownInput::Generic) => {
                     Some(variable(f, factors.len() + i))
                 }
-                role => factors.of_role(role, &judged.layout).map(|v| variable(f, v)),
+                // the value in the first experiment is no factor of the others
+                Role::Constant(c) if own_constant(c) => None,
+                role => factors.of_role(role, &judged.layout, experiment).map(|v| variable(f, v)),
             },
             Op::Add(a, b) => sum(a, b, f.one()),
             Op::Subtract(a, b) => sum(a, b, f.neg(f.one())),
@@ -193,7 +212,9 @@ fn nodes(
             }
             Op::Pi => None,
         };
-        out.push(own);
+        let terms = own.as_ref().map_or(0, BTreeMap::len);
+        out.push(own.filter(|_| terms <= left));
+        left = left.saturating_sub(terms);
     }
     out
 }
@@ -219,7 +240,7 @@ pub(super) fn terms_of_quotient(f: &Field, [above, below]: &[Polynomial; 2]) -> 
     let mut terms = with_integers(f, &terms)?;
     let divisor: QuotientPowers = divisor.iter().map(|&(v, e)| (v as usize, -(e as i32))).collect();
     for (_, powers) in &mut terms {
-        *powers = multiplied(powers, &divisor);
+        *powers = multiplied(powers, &divisor)?;
     }
     Some(terms)
 }

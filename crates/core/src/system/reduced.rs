@@ -67,7 +67,7 @@ pub fn reduced(model: &SystemModel, seed: u64, order: Option<usize>) -> Result<R
     }
     let lanes = fixed_lanes(&judged, span);
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
-    let (functions, _) = identifiable_functions(model, &compiled, &judged, &symmetries, seed)?;
+    let functions = identifiable_functions(model, &compiled, &judged, &symmetries, seed)?.found;
     let mut listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
     listed.extend(functions.iter().map(|f| f.terms.clone()));
     let ones = lanes.iter().map(|&l| (l, 1)).collect::<Vec<_>>();

@@ -37,6 +37,14 @@ pub struct Unknown {
     pub experiment: Option<usize>,
 }
 
+impl Unknown {
+    /// Name in a formula: `w''''` instead of `w^(4)`, which reads as a power there.
+    pub(super) fn in_formulas(&self) -> String {
+        let order = self.derivative;
+        self.name.replacen(&format!("^({order})"), &"'".repeat(order), 1)
+    }
+}
+
 /// Unknowns of a system, and the orders to which it has to be differentiated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Layout {
@@ -728,20 +736,24 @@ impl<'a, S: Values> SystemRows<'a, S> {
         self.runs[run].taylor.is_known(node)
     }
 
-    /// Value of every unknown at this point (of inputs the Taylor coefficients), then of some nodes (in the
-    /// first segment), zero without a node.
+    /// Value of every unknown at this point (of inputs the Taylor coefficients), then of derivatives of some
+    /// nodes that were computed (in the first segment), zero without a node.
     pub(crate) fn values(
         &self,
         compiled: &Compiled,
         layout: &Layout,
-        nodes: &[Option<usize>],
+        nodes: &[Option<(usize, usize)>],
     ) -> Vec<S::Element> {
         let segments = compiled.segments.len().max(1);
         let value = |u: &Unknown| {
             let run = self.runs.get(u.experiment.unwrap_or(0) * segments)?;
             Some(run.taylor.value(compiled.node_of(u.role)?, u.derivative))
         };
-        let of_node = |node: &Option<usize>| Some(self.runs.first()?.taylor.value((*node)?, 0));
+        let of_node = |node: &Option<(usize, usize)>| {
+            let (node, order) = (*node)?;
+            let value = self.runs.first()?.taylor.value(node, order);
+            Some((2..=order).fold(value, |x, k| self.field.mul(&x, &self.field.integer(k as i64))))
+        };
         let unknowns = layout.unknowns.iter().map(value);
         unknowns.chain(nodes.iter().map(of_node)).map(|x| x.unwrap_or(self.field.zero())).collect()
     }

@@ -211,6 +211,7 @@ fn symmetries_in<S: Values>(
         out.unexplained = search.unexplained(&at, &mut tangents);
     }
     out.invariants = invariants(&search.f, n, &out.found, &at, &mut search.budget);
+    out.invariants.retain(|i| i.terms.iter().all(|t| judged.shown(model, t.0)));
     (out.stopped, out.work) = (search.budget.stopped(), search.budget.spent);
     Ok(out)
 }

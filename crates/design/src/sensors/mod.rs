@@ -202,7 +202,7 @@ pub fn sensors(
         match task.differs(&*second) {
             None if first.is_clear() && second.is_clear() => return Ok(answer),
             None => {
-                let reason = "real numbers of 154 and 308 digits leave ranks unclear".into();
+                let reason = "real numbers of 192 and 308 digits leave ranks unclear".into();
                 return Err(SensorError::Undecided { reason });
             }
             differs => disagreed = differs,
