@@ -351,7 +351,11 @@ fn role_name(model: &SystemModel, role: Role) -> String {
     match role {
         Role::State(i) => model.states[i].named.name.clone(),
         Role::Parameter(i) => model.parameters[i].name.clone(),
-        Role::UnknownInput(i) => model.unknown_inputs[i].0.name.clone(),
+        Role::UnknownInput(i) => {
+            let (named, degree) = &model.unknown_inputs[i];
+            let derivatives = if *degree == Some(0) { "" } else { " with its derivatives" };
+            format!("{}{derivatives}", named.name)
+        }
         Role::Constant(i) => model.constants[i].0.name.clone(),
         Role::KnownInput(i) => model.known_inputs[i].0.name.clone(),
         Role::Time => "t".into(),

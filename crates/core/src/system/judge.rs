@@ -1,7 +1,7 @@
 //! Verdicts on any system: degrees on which two random points agree, modulo two primes or in many digits.
 
 use obsdeg_exact::certainty::{RankClaim, error_bound as bound_in};
-use obsdeg_exact::{Echelon, Field, RankMargin, Reals, RootField, RowSpace, SplitMix64};
+use obsdeg_exact::{Echelon, Field, RankMargin, Reals, RootField, RowSpace, SplitMix64, parallel};
 
 use super::addition::written_apart;
 use super::branches::{BranchSide, Signs, sided, sides};
@@ -460,18 +460,30 @@ fn judge_in_fields(
     let order = points.root_order();
     let runs = compiled.segments.len().max(1) * model.experiments.max(1);
     for attempt in 0..ATTEMPTS {
-        let mut judged = |i: usize| {
+        let judged = |i: usize, spent: &mut Spent| {
             let mut rng = model.random(seed, &format!("verdicts, attempt {attempt}, field {i}"));
             let mut own = model.random(seed, &format!("points of constraints, attempt {attempt}, field {i}"));
             let field = points.field(&mut rng, &mut own, spent);
             climb_at(model, compiled, layout, field, &mut rng, spent).map(|at| (field, at))
         };
-        let ((p, first), (q, second)) = (judged(0)?, judged(1)?);
+        let alone = |i: usize| {
+            let mut own = Spent::default();
+            (judged(i, &mut own), own)
+        };
+        // long work is done at both points at once
+        let ((p, first), (q, second)) = if orders < LONG {
+            (judged(0, spent)?, judged(1, spent)?)
+        } else {
+            let ((first, of_first), (second, of_second)) = parallel::join(|| alone(0), || alone(1));
+            spent.join(&of_first);
+            spent.join(&of_second);
+            (first?, second?)
+        };
         if first.agrees(&second) {
             let claim = RankClaim { order, ..claim(compiled, layout, &first.degrees, runs) };
             let (mut third, mut error_bound) = (None, bound_in(&claim, 2));
             if error_bound > CERTAIN {
-                let (r, other) = judged(2)?;
+                let (r, other) = judged(2, spent)?;
                 if !first.agrees(&other) {
                     continue;
                 }

@@ -260,6 +260,12 @@ impl Spent {
         self.operations = self.operations.saturating_add(work.spent.get());
         self.refused |= work.refused.get().is_some();
     }
+
+    /// Adds the operations of other verdicts or points.
+    pub(super) fn join(&mut self, other: &Self) {
+        self.operations = self.operations.saturating_add(other.operations);
+        self.refused |= other.refused;
+    }
 }
 
 #[cfg(test)]
