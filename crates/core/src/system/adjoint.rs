@@ -397,11 +397,39 @@ fn inverse<S: Values>(f: &S, b: &[S::Element], n: usize) -> TaylorSeries<S> {
 
 #[cfg(test)]
 mod tests {
-    use obsdeg_exact::{Field, Scalars, SplitMix64};
+    use obsdeg_exact::{Field, RootField, Scalars, SplitMix64};
 
     use crate::system::model_file;
     use crate::system::rows::{Layout, PointBuilder, random_field};
     use crate::system::work::Work;
+
+    /// Holds the rows of a model against duals in every node; returns true if a Jacobian was used.
+    fn holds_against_forwards(text: &str, field: impl Fn(&mut SplitMix64) -> Field, orders: usize) -> bool {
+        let model = model_file::read(text).expect("a model");
+        let compiled = model.compile().expect("a graph");
+        let layout = Layout::new(&model, &compiled, None);
+        let mut rng = SplitMix64::new(5);
+        let field = field(&mut rng);
+        let work = Work::new(model.work_limit);
+        let builder =
+            PointBuilder { model: &model, compiled: &compiled, layout: &layout, field, work: &work };
+        let (mut forward, mut adjoint) = builder.both(&mut rng);
+        let mut factorial = field.one();
+        for order in 0..orders {
+            factorial = Scalars::mul(&field, &factorial, &field.integer((order as i64).max(1)));
+            while forward.length <= order {
+                forward.advance();
+            }
+            for (&output, row) in compiled.outputs(0).iter().zip(adjoint.rows(order)) {
+                let mut expected = vec![0; layout.unknowns.len()];
+                for (&lane, x) in forward.lanes_of(output).iter().zip(forward.dual(output, order)) {
+                    expected[lane as usize] = Scalars::mul(&field, x, &factorial);
+                }
+                assert_eq!(row, expected, "order {order} of {text}");
+            }
+        }
+        adjoint.jacobian.is_some()
+    }
 
     /// The rows agree with duals in every node, to orders beyond the first length.
     #[test]
@@ -413,30 +441,29 @@ mod tests {
              u*z/x'\n[outputs]\ny='x^3/z'\n[known_inputs]\nu={polynomial=1}\n",
             "[states]\nx='a/b'\nz='log(x + z)*tanh(a)'\n[outputs]\ny='z'\n",
         ] {
-            let model =
-                model_file::read(&format!("name='m'\nparameters=['a', 'b']\n{text}")).expect("a model");
-            let compiled = model.compile().expect("a graph");
-            let layout = Layout::new(&model, &compiled, None);
-            let mut rng = SplitMix64::new(5);
-            let field: Field = random_field(&mut rng);
-            let work = Work::new(model.work_limit);
-            let builder =
-                PointBuilder { model: &model, compiled: &compiled, layout: &layout, field, work: &work };
-            let (mut forward, mut adjoint) = builder.both(&mut rng);
-            let mut factorial = field.one();
-            for order in 0..12 {
-                factorial = Scalars::mul(&field, &factorial, &field.integer((order as i64).max(1)));
-                while forward.length <= order {
-                    forward.advance();
-                }
-                for (&output, row) in compiled.outputs(0).iter().zip(adjoint.rows(order)) {
-                    let mut expected = vec![0; layout.unknowns.len()];
-                    for (&lane, x) in forward.lanes_of(output).iter().zip(forward.dual(output, order)) {
-                        expected[lane as usize] = Scalars::mul(&field, x, &factorial);
-                    }
-                    assert_eq!(row, expected, "order {order} of {text}");
-                }
-            }
+            holds_against_forwards(&format!("name='m'\nparameters=['a', 'b']\n{text}"), random_field, 12);
         }
+    }
+
+    /// The same for chains whose series are long enough to be transformed, at all sizes, with a Jacobian; and
+    /// for a model whose Jacobian is full, without one.
+    #[test]
+    fn the_same_by_the_jacobian() {
+        let n = 60;
+        let states: String = (1..n).map(|i| format!("x{i}='a{i}*(x{} - x{i})*x{i} + u'\n", i - 1)).collect();
+        let parameters: String = (0..n).map(|i| format!("a{i}={{}}\n")).collect();
+        let text = |rate: &str| {
+            format!(
+                "name='m'\n[states]\nx0='{rate}'\n{states}[parameters]\n{parameters}[known_inputs]\nu='generic'\n\
+                 [outputs]\ny='x{}'\nz='x1*a0'\n",
+                n - 1
+            )
+        };
+        let root = |rng: &mut SplitMix64| RootField::random(1 << 9, rng).expect("a field").field;
+        assert!(holds_against_forwards(&text("-a0*x0*x0"), root, 140));
+        let all: Vec<String> = (1..n).map(|i| format!("x{i}")).collect();
+        let full: String = (0..n).map(|i| format!("x{i}='a{i}*x{i}*({})'\n", all.join(" + "))).collect();
+        let full = format!("name='m'\n[states]\n{full}[parameters]\n{parameters}[outputs]\ny='x1'\n");
+        assert!(!holds_against_forwards(&full, root, 20));
     }
 }
