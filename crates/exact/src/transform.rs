@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use crate::Field;
+use crate::{Field, interrupt};
 
 /// Number of coefficients below which a product is summed directly.
 const SHORT: usize = 64;
@@ -94,6 +94,7 @@ impl Transform {
         let size = size_for(n);
         if n < SHORT || size.next_power_of_two().trailing_zeros() as usize > self.roots.len() {
             let sum = |list: &Vec<(usize, usize, &[u64])>| {
+                interrupt::check();
                 let products = list.iter().filter_map(|&(i, _, b)| Some(self.product(of[i]?, b, n)));
                 products.reduce(|mut sum, product| {
                     sum.iter_mut().zip(product).for_each(|(x, y)| *x = f.add(*x, y));
@@ -119,10 +120,14 @@ impl Transform {
         }
         let mut used = vec![false; of.len()];
         lists.iter().flatten().for_each(|part| used[part.0] = true);
-        let spectrum = |a: &[u64]| self.spectrum(&a[..a.len().min(n)], size);
+        let spectrum = |a: &[u64]| {
+            interrupt::check();
+            self.spectrum(&a[..a.len().min(n)], size)
+        };
         let spectra: Vec<Option<Vec<u64>>> =
             of.iter().zip(&used).map(|(a, used)| a.filter(|_| *used).map(spectrum)).collect();
         let sum = |list: &Vec<(usize, usize, &[u64])>| {
+            interrupt::check();
             let part =
                 |&(i, key, _): &(usize, usize, &[u64])| Some((spectra[i].as_ref()?, &self.spectra[&key]));
             let parts: Vec<_> = list.iter().filter_map(part).collect();
