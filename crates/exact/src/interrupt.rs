@@ -110,6 +110,15 @@ pub fn check() {
 #[derive(Debug, Clone)]
 pub(crate) struct InterruptHandle(Option<Arc<AtomicBool>>);
 
+/// True if a callback of this thread is asked whether its work goes on: then parts on other threads would
+/// not hear the answer.
+pub(crate) fn asks() -> bool {
+    let hearing = CANCELLATION.take();
+    let asks = matches!(hearing, Some(Cancellation::Callback { .. }));
+    CANCELLATION.set(hearing);
+    asks
+}
+
 /// Handle for the parts of the work of this thread.
 pub(crate) fn parts() -> InterruptHandle {
     let hearing = CANCELLATION.take();

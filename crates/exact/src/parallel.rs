@@ -11,8 +11,12 @@ use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterato
 
 use crate::interrupt;
 
-/// Calls `work` for every index below `count`, in any order, on all threads.
+/// Calls `work` for every index below `count`, in any order, on all threads; on this one if a callback of it
+/// is asked whether the work goes on.
 fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    if interrupt::asks() {
+        return (0..count).for_each(work);
+    }
     let parts = interrupt::parts();
     (0..count).into_par_iter().with_max_len(1).for_each(|i| parts.part(|| work(i)));
 }
@@ -132,6 +136,20 @@ mod tests {
         assert_eq!(find_first(1000, |_| None::<u8>), None);
         assert!(all(1000, &|i| i < 1000) && !all(1000, &|i| i != 999));
         assert_eq!(join(|| join(|| 1, || "b"), || 2.5), ((1, "b"), 2.5));
+    }
+
+    /// A callback of this thread is asked during the items, and ends them.
+    #[test]
+    fn a_callback_ends_the_items() {
+        let asked = std::rc::Rc::new(std::cell::Cell::new(0));
+        let count = asked.clone();
+        let goes_on = move || {
+            count.set(count.get() + 1);
+            count.get() < 3
+        };
+        let work = || join(|| (0..1000).for_each(|_| interrupt::check()), || ());
+        assert!(interrupt::hearing(std::time::Duration::ZERO, goes_on, work).is_none());
+        assert_eq!(asked.get(), 3);
     }
 
     #[test]
