@@ -318,6 +318,9 @@ fn functions_of_other_factors_by_hand() {
         assert_eq!((listed, a.missing_functions), (functions, 0), "{text}");
     }
     assert_eq!(number(of(sum).invariants[0].number_of_solutions.as_ref()), Some(1));
+    // in real numbers too, derivatives of an arbitrary input do not count: a*sqrt(x) + w alone is missing
+    let root = of("x='a*sqrt(x) + w'\n[parameters]\na={}\n[unknown_inputs]\nw='arbitrary'\n[outputs]\ny='x'");
+    assert_eq!((root.digits.is_some(), root.missing_functions), (true, 1));
     let moved = of(derivatives);
     let words: Vec<&str> = moved.symmetries.iter().map(|s| s.words.as_str()).collect();
     assert!(words.contains(&"add c to q; subtract c from w''"), "{words:?}");

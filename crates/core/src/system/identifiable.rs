@@ -74,8 +74,7 @@ pub(super) fn identifiable_functions(
     let degrees = &judged.findings.degrees;
     let shown: Vec<bool> = (0..degrees.degree.len()).map(|c| judged.shown(model, c)).collect();
     let observable = degrees.degree.iter().zip(&shown).filter(|(d, shown)| d.is_some() && **shown).count();
-    let number = |all: usize| all.saturating_sub(observable + symmetries.invariants.len());
-    let missing = number(judged.span.as_ref().map_or(degrees.rank(), |span| of_shown(span, &shown)));
+    let missing = judged.shown_rank.saturating_sub(observable + symmetries.invariants.len());
     // values of functions in a field are independent of each other if functions of sums are written apart
     let apart = if judged.fields.is_some() { None } else { written_apart(compiled) };
     let compiled = apart.as_ref().unwrap_or(compiled);
@@ -84,7 +83,7 @@ pub(super) fn identifiable_functions(
         return Ok(IdentifiableFunctions { found: Vec::new(), missing, factors });
     };
     let mut search = FunctionSearch::new(model, compiled, judged, f, seed)?;
-    (search.all, search.shown) = (of_shown(&search.first().span, &shown), shown);
+    (search.all, search.shown) = (judged.shown_rank, shown);
     let listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
     for terms in &listed {
         let gradient = search.gradient(terms, search.first());
@@ -123,17 +122,6 @@ fn fields(judged: &Judgement) -> Option<[Field; 2]> {
         SystemCertainty::Primes(by) => Some(by.primes.map(Field::new)),
         SystemCertainty::Digits(_) => None,
     }
-}
-
-/// Number of independent functionals in a span that contain only the unknowns in `shown`.
-fn of_shown(span: &Echelon, shown: &[bool]) -> usize {
-    let hidden: Vec<usize> = (0..shown.len()).filter(|&c| !shown[c]).collect();
-    let mut part = Echelon::new(span.field(), hidden.len());
-    for i in 0..span.rank() {
-        let row = span.row(i);
-        part.insert(&hidden.iter().map(|&c| row[c]).collect::<Vec<_>>());
-    }
-    span.rank() - part.rank()
 }
 
 /// Invariant of the symmetries as a sum of products of powers.
@@ -338,7 +326,11 @@ impl<'a> FunctionSearch<'a> {
     }
 
     /// Keeps a function if it is identifiable and independent of those before it.
-    fn keep(&mut self, terms: Terms) {
+    fn keep(&mut self, mut terms: Terms) {
+        // known factors of all terms say nothing
+        let known = common_factor(&terms).into_iter().filter(|p| self.factors.lane(p.0).is_none());
+        let known: QuotientPowers = known.collect();
+        terms.iter_mut().for_each(|t| t.1 = without(&t.1, &known));
         if !terms.iter().flat_map(|t| &t.1).all(|p| self.is_shown(p.0)) {
             return;
         }
@@ -383,6 +375,23 @@ impl<'a> FunctionSearch<'a> {
     }
 }
 
+/// Powers that divide all terms.
+fn common_factor(terms: &Terms) -> QuotientPowers {
+    let Some((first, others)) = terms.split_first() else { return Vec::new() };
+    let smallest = |&(c, e): &(usize, i32)| {
+        let exponents = others.iter().map(|t| t.1.iter().find(|p| p.0 == c).map_or(0, |p| p.1));
+        let least = exponents.map(|x| x * e.signum()).fold(e.abs(), i32::min);
+        (least > 0).then(|| (c, least * e.signum()))
+    };
+    first.1.iter().filter_map(smallest).collect()
+}
+
+/// Product of powers divided by another one.
+fn without(powers: &[(usize, i32)], divisor: &[(usize, i32)]) -> QuotientPowers {
+    let own = |c: usize| divisor.iter().find(|p| p.0 == c).map_or(0, |p| p.1);
+    powers.iter().map(|&(c, e)| (c, e - own(c))).filter(|p| p.1 != 0).collect()
+}
+
 /// Value of a product of powers.
 fn product(f: &Field, powers: &[(usize, i32)], values: &[u64], inverses: &[u64]) -> u64 {
     powers.iter().fold(f.one(), |x, &(c, e)| {
@@ -412,29 +421,13 @@ fn gradient(
 }
 
 impl IdentifiableFunction {
-    /// Powers that divide all terms, if there are several.
-    fn common_factor(&self) -> QuotientPowers {
-        let [first, others @ ..] = &self.terms[..] else { return Vec::new() };
-        if others.is_empty() {
-            return Vec::new();
-        }
-        let smallest = |&(c, e): &(usize, i32)| {
-            let exponents = others.iter().map(|t| t.1.iter().find(|p| p.0 == c).map_or(0, |p| p.1));
-            let least = exponents.map(|x| x * e.signum()).fold(e.abs(), i32::min);
-            (least > 0).then(|| (c, least * e.signum()))
-        };
-        first.1.iter().filter_map(smallest).collect()
-    }
-
     /// Function in words: `S*w`, `U*w + I*w`, `beta/(N*w)`; common factors stand before brackets.
     pub(super) fn text(&self, name: &dyn Fn(usize) -> String) -> String {
-        let common = self.common_factor();
+        let common = if self.terms.len() > 1 { common_factor(&self.terms) } else { Vec::new() };
         let divisor = self.terms.iter().fold(0, |g, t| gcd(g, t.0)).max(1);
         let mut sum = String::new();
         for (number, powers) in &self.terms {
-            let own = |c: usize| common.iter().find(|p| p.0 == c).map_or(0, |p| p.1);
-            let rest = powers.iter().map(|&(c, e)| (c, e - own(c))).filter(|p| p.1 != 0);
-            let rest: QuotientPowers = rest.collect();
+            let rest = without(powers, &common);
             let number = number / divisor;
             sum.push_str(match (sum.is_empty(), number < 0) {
                 (true, true) => "-",

@@ -12,7 +12,7 @@ use super::function_factors::Factors;
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, Role, StartTime, SystemModel};
 use super::real_points::{dependent_at_points, real_point};
-use super::rows::{Layout, PointBuilder, SystemRows, random_field};
+use super::rows::{Layout, PointBuilder, SystemRows, Unknown, random_field};
 use super::taylor::Singular;
 use super::values::Values;
 use super::work::{Spent, Work, WorkStep, product};
@@ -52,6 +52,8 @@ pub struct Judgement {
     pub certainty: SystemCertainty,
     /// Span of all rows in the first prime field; `None` if real numbers decided.
     pub span: Option<Echelon>,
+    /// Number of independent functions of the reported unknowns that the outputs determine.
+    pub(super) shown_rank: usize,
     /// The two prime fields of a rational model.
     pub fields: Option<[Field; 2]>,
     /// Number of functions whose values are proven to be independent of each other, so that random values
@@ -89,11 +91,7 @@ pub struct ByDigits {
 impl Judgement {
     /// True if an unknown is reported: of arbitrary inputs only the signal itself, not its derivatives.
     pub fn shown(&self, model: &SystemModel, unknown: usize) -> bool {
-        let u = &self.layout.unknowns[unknown];
-        match u.role {
-            Role::UnknownInput(i) => u.derivative == 0 || model.unknown_inputs[i].1.is_some(),
-            _ => true,
-        }
+        is_shown(model, &self.layout.unknowns[unknown])
     }
 
     /// Verdict on the unknown of a name; `None` if it is not reported.
@@ -119,6 +117,24 @@ impl Judgement {
             _ => verdict,
         }
     }
+}
+
+/// True if an unknown is reported.
+fn is_shown(model: &SystemModel, u: &Unknown) -> bool {
+    match u.role {
+        Role::UnknownInput(i) => u.derivative == 0 || model.unknown_inputs[i].1.is_some(),
+        _ => true,
+    }
+}
+
+/// Number of independent functionals in a span that contain only unknowns other than `hidden`.
+fn rank_without<S: Values>(f: &S, span: &S::Space, hidden: &[usize]) -> usize {
+    let mut part = <S::Space as RowSpace>::new(f.clone(), hidden.len());
+    for i in 0..span.rank() {
+        let row = span.row(i);
+        part.insert(&hidden.iter().map(|&c| row[c]).collect::<Vec<_>>());
+    }
+    span.rank() - part.rank()
 }
 
 /// Degrees at one random point.
@@ -498,7 +514,7 @@ fn judge_in_fields(
             }
             let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), third, error_bound };
             let span = first.span.clone();
-            let judged = Judgement::of(layout.clone(), first, SystemCertainty::Primes(primes), seed);
+            let judged = Judgement::of(model, layout.clone(), first, SystemCertainty::Primes(primes), seed);
             let fields = compiled.dag.is_rational().then_some([p, q]);
             let work = spent.operations - before;
             return Ok(Judgement { span: fields.map(|_| span), fields, work, ..judged });
@@ -690,7 +706,7 @@ fn pair<const A: usize, const B: usize>(
     let certainty =
         SystemCertainty::Digits(ByDigits { digits, nonzero: decimal(gap.nonzero), zero: decimal(gap.zero) });
     let sides = sides(model, compiled, &[first.signs.clone(), second.signs]);
-    Ok(Ok(Judgement { sides, ..Judgement::of(layout.clone(), first, certainty, seed) }))
+    Ok(Ok(Judgement { sides, ..Judgement::of(model, layout.clone(), first, certainty, seed) }))
 }
 
 impl<S: Values> PointDegrees<S> {
@@ -700,9 +716,18 @@ impl<S: Values> PointDegrees<S> {
 }
 
 impl Judgement {
-    fn of<S: Values>(layout: Layout, at: PointDegrees<S>, certainty: SystemCertainty, seed: u64) -> Self {
+    fn of<S: Values>(
+        model: &SystemModel,
+        layout: Layout,
+        at: PointDegrees<S>,
+        certainty: SystemCertainty,
+        seed: u64,
+    ) -> Self {
         let full = at.degrees.rank() == layout.unknowns.len();
+        let hidden = |lane: &usize| !is_shown(model, &layout.unknowns[*lane]);
+        let hidden: Vec<usize> = (0..layout.unknowns.len()).filter(hidden).collect();
         Self {
+            shown_rank: rank_without(&at.steps.field, &at.span, &hidden),
             rests_on_bound: !full && !at.ended,
             findings: Findings {
                 partners: at.span.companions(),
