@@ -126,7 +126,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("order", MODELS, "Highest order of derivatives where a model has no proven end"),
     ("count_limit", MODELS, "Work of counting the solutions of a model (default: 3)"),
     ("work_limit", MODELS, "Work of a verdict: millions of operations (default: 600)"),
-    ("relation_limit", MODELS, "Work of global verdicts by output relations (default: 0, off)"),
+    ("relation_limit", MODELS, "Work of global verdicts by output relations (default: 50)"),
     ("starts", MODELS, "Starts of the iteration"),
     ("profile", MODELS, "Unknown whose profile is drawn; once per unknown"),
     ("solutions", SOLUTIONS, "Expressions and numbers of solutions: on or off"),

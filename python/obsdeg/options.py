@@ -133,7 +133,7 @@ class Analyze(Seeded, Positions, total=False):
     count_limit: int
     """Limit of the work of counting the solutions of a model: millions of products at each of two points."""
     relation_limit: int
-    """Limit of the work of relations among output derivatives: millions of products at each of two points; 0: none [default: 0]."""
+    """Limit of the work of relations among output derivatives: millions of products at each of two points; 0: none [default: 50]."""
     solutions: bool
     """Solving expressions and numbers of solutions [default: True]."""
     frame: Literal["n", "platform"]

@@ -46,7 +46,8 @@ pub struct Analyze {
     pub count_limit: Option<u64>,
 
     /// Limit of the work of relations among output derivatives, sought where counting does not decide how
-    /// many solutions there are: millions of products at each of two points (5 ms each); 0: none [default: 0]
+    /// many solutions there are: millions of products at each of two points (5 ms each); 0: none
+    /// [default: 50]
     #[arg(long, value_name = "MILLIONS", help_heading = "Models", value_parser = whole::<u64>(ANY))]
     pub relation_limit: Option<u64>,
 

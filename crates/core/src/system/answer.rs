@@ -24,8 +24,8 @@ use crate::why::Why;
 /// Default of [`SystemOptions::count_limit`]: most reference models need less.
 pub const COUNT_LIMIT: u64 = 3;
 
-/// Default of [`SystemOptions::relation_limit`]: relations are sought on request only.
-pub const RELATION_LIMIT: u64 = 0;
+/// Default of [`SystemOptions::relation_limit`]: a fraction of a second, and rarely more than two.
+pub const RELATION_LIMIT: u64 = 50;
 
 /// Name and version of the JSON layout.
 pub const SCHEMA: &str = "obsdeg.system/1";
@@ -297,8 +297,8 @@ pub struct SystemOptions {
     /// points.
     pub count_limit: u64,
     /// Limit of the work of relations among derivatives of the outputs, which are sought if counting leaves
-    /// a number undecided. In millions of products of two coefficients, at each of two points; 0: none are
-    /// sought.
+    /// a number undecided, and of another count after them. In millions of products of two coefficients, at
+    /// each of two points; 0: neither is done.
     pub relation_limit: u64,
     /// Highest order of derivatives. `None`: n for each experiment if chains end by themselves, else 2n+4,
     /// and at least 60 without arbitrary inputs.

@@ -14,7 +14,7 @@ use super::model::{Compiled, KnownInput, Role, SystemModel};
 use super::quotients::Terms;
 use super::rows::SystemRows;
 use super::twins::{Twin, images, twins};
-use super::undecided::{NotCounted, UNKNOWNS};
+use super::undecided::{ENOUGH, NotCounted, UNKNOWNS};
 use super::work;
 
 /// Number of orders beyond the last one at which rank grows. Of 0 to 6, this one decides most of the
@@ -22,6 +22,9 @@ use super::work;
 const BEYOND: usize = 3;
 /// Number of runs from the same start with other values of generic inputs, if one run does not decide.
 const OTHERS: usize = 2;
+
+/// Limit of work of the first round of relations, in products of two coefficients.
+const FIRST_ROUND: u64 = 100_000_000;
 
 /// Number of values of an unknown, or the reason why it is not decided.
 pub(super) type SolutionCount = Result<usize, NotCounted>;
@@ -247,18 +250,23 @@ impl SolutionCounting<'_> {
         if self.is_open(&counts) && others > 0 {
             self.again(&mut counts, CountStage::new(others, limits.count), [&nothing; 2]);
         }
-        if !self.is_open(&counts) || limits.relations == 0 || !self.compiled.dag.is_rational() {
+        if !self.compiled.dag.is_rational() {
             return counts;
         }
-        let single: Vec<usize> = (0..counts.len()).filter(|&l| counts[l] == Ok(1)).collect();
-        if global::applies(self.model, self.compiled, self.judged)
-            && let Some([first, second]) = self.by_relations(limits.relations, &single)
-        {
-            self.again(&mut counts, CountStage::new(others, limits.count), [&first, &second]);
-        }
-        for others in if others > 0 { vec![0, others] } else { vec![0] } {
-            if self.is_open(&counts) && limits.relations > limits.count {
-                self.again(&mut counts, CountStage::new(others, limits.relations), [&nothing; 2]);
+        let runs = if others > 0 { vec![0, others] } else { vec![0] };
+        let relations = global::applies(self.model, self.compiled, self.judged);
+        for limit in rounds(limits.relations) {
+            let single: Vec<usize> = (0..counts.len()).filter(|&l| counts[l] == Ok(1)).collect();
+            if relations
+                && self.is_open(&counts)
+                && let Some([first, second]) = self.by_relations(limit, &single)
+            {
+                self.again(&mut counts, CountStage::new(others, limits.count), [&first, &second]);
+            }
+            for &others in runs.iter().filter(|_| limit > limits.count) {
+                if self.is_open(&counts) {
+                    self.again(&mut counts, CountStage::new(others, limit), [&nothing; 2]);
+                }
             }
         }
         counts
@@ -309,6 +317,15 @@ impl SolutionCounting<'_> {
     }
 }
 
+/// Limits of the work of the rounds: a small one first, since relations that decide nothing take all the work
+/// that is allowed, and a count that decides often takes little.
+fn rounds(limit: u64) -> Vec<u64> {
+    let mut out = vec![FIRST_ROUND.min(limit), limit];
+    out.dedup();
+    out.retain(|&round| round > 0);
+    out
+}
+
 /// Numbers of values that the unknowns and functions take.
 pub(super) fn values_taken(
     model: &SystemModel,
@@ -335,9 +352,10 @@ pub(super) fn values_taken(
     let twins = counting.confirmed(&mut counts);
     let maps: Vec<String> = twins.iter().map(|t| t.words(compiled, &|role| role_name(model, role))).collect();
     let (maps, of_functions) = counting.of_all(&counts, maps, limits.count);
-    let unused = limits.relations == 0 && global::applies(model, compiled, judged);
     let advised = |count: SolutionCount| match count {
-        Err(NotCounted::OverLimit) if unused => Err(NotCounted::WithoutRelations),
+        Err(NotCounted::OverLimit) if limits.relations < ENOUGH * 1_000_000 => {
+            Err(NotCounted::InLittleWork)
+        }
         count => count,
     };
     let observable =

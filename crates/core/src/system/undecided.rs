@@ -9,6 +9,9 @@ pub(super) const UNKNOWNS: usize = 60;
 /// Largest number of terms of a polynomial that is formed.
 pub(super) const LONGEST: usize = 400;
 
+/// Work of relations, in millions of products, that decides most published systems.
+pub(super) const ENOUGH: u64 = 6000;
+
 /// Reason why the number of solutions is not decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum NotCounted {
@@ -27,18 +30,18 @@ pub(super) enum NotCounted {
     /// An equation is too long.
     #[error("an equation has more than {LONGEST} terms")]
     TooLong,
-    /// The elimination exceeds its limit of work.
+    /// The elimination exceeds its limits of work.
     #[error(
-        "the elimination takes more products of coefficients than --count-limit allows; a larger \
-         --count-limit may decide"
+        "the elimination takes more products of coefficients than --count-limit and --relation-limit allow; a \
+         larger one may decide"
     )]
     OverLimit,
-    /// The elimination exceeds its limit of work, and relations were not sought.
+    /// The elimination exceeds its limits of work, and relations were sought with little work.
     #[error(
-        "the elimination takes more products of coefficients than --count-limit allows; a larger \
-         --count-limit, or relations among output derivatives (--relation-limit 6000), may decide"
+        "the elimination takes more products of coefficients than its limits allow; --relation-limit \
+         {ENOUGH}, which takes a minute, may decide"
     )]
-    WithoutRelations,
+    InLittleWork,
     /// The elimination needs a power that it does not form.
     #[error("the elimination would form powers above 255, whatever --count-limit")]
     TooHigh,
