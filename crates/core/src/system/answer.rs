@@ -297,8 +297,8 @@ pub struct SystemOptions {
     /// points.
     pub count_limit: u64,
     /// Limit of the work of relations among derivatives of the outputs, which are sought if counting leaves
-    /// a number undecided, and of another count after them. In millions of products of two coefficients, at
-    /// each of two points; 0: neither is done.
+    /// a number undecided; a fifth of it for another count after them. In millions of products of two
+    /// coefficients, at each of two points; 0: neither is done.
     pub relation_limit: u64,
     /// Highest order of derivatives. `None`: n for each experiment if chains end by themselves, else 2n+4,
     /// and at least 60 without arbitrary inputs.

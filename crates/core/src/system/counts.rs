@@ -25,6 +25,9 @@ const OTHERS: usize = 2;
 
 /// Limit of work of the first round of relations, in products of two coefficients.
 const FIRST_ROUND: u64 = 100_000_000;
+/// Divisor of the limit for another elimination: its products take some five times as long as those of
+/// relations, as monomials are looked up for them.
+const ELIMINATION: u64 = 5;
 
 /// Number of values of an unknown, or the reason why it is not decided.
 pub(super) type SolutionCount = Result<usize, NotCounted>;
@@ -34,8 +37,8 @@ pub(super) type SolutionCount = Result<usize, NotCounted>;
 pub(super) struct CountLimits {
     /// Limit for counting solutions of the equations in the unknowns.
     pub(super) count: u64,
-    /// Limit for relations among derivatives of the outputs, and for a second count if the first leaves
-    /// numbers undecided; zero: neither is done.
+    /// Limit for relations among derivatives of the outputs; a share of it for a second count if the first
+    /// leaves numbers undecided; zero: neither is done.
     pub(super) relations: u64,
 }
 
@@ -263,9 +266,10 @@ impl SolutionCounting<'_> {
             {
                 self.again(&mut counts, CountStage::new(others, limits.count), [&first, &second]);
             }
-            for &others in runs.iter().filter(|_| limit > limits.count) {
+            let elimination = limit / ELIMINATION;
+            for &others in runs.iter().filter(|_| elimination > limits.count) {
                 if self.is_open(&counts) {
-                    self.again(&mut counts, CountStage::new(others, limit), [&nothing; 2]);
+                    self.again(&mut counts, CountStage::new(others, elimination), [&nothing; 2]);
                 }
             }
         }
@@ -353,9 +357,7 @@ pub(super) fn values_taken(
     let maps: Vec<String> = twins.iter().map(|t| t.words(compiled, &|role| role_name(model, role))).collect();
     let (maps, of_functions) = counting.of_all(&counts, maps, limits.count);
     let advised = |count: SolutionCount| match count {
-        Err(NotCounted::OverLimit) if limits.relations < ENOUGH * 1_000_000 => {
-            Err(NotCounted::InLittleWork)
-        }
+        Err(NotCounted::OverLimit) if limits.relations < ENOUGH * 1_000_000 => Err(NotCounted::InLittleWork),
         count => count,
     };
     let observable =

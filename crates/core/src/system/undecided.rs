@@ -39,7 +39,7 @@ pub(super) enum NotCounted {
     /// The elimination exceeds its limits of work, and relations were sought with little work.
     #[error(
         "the elimination takes more products of coefficients than its limits allow; --relation-limit \
-         {ENOUGH}, which takes a minute, may decide"
+         {ENOUGH}, which takes up to half a minute, may decide"
     )]
     InLittleWork,
     /// The elimination needs a power that it does not form.
