@@ -8,7 +8,7 @@ use obsdeg_exact::SplitMix64;
 
 fn analyzed(text: &str) -> SystemAnalysis {
     let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
-    // of two forms of a model, one takes more work than the other: here both are within the limit or beyond it
+    // of two forms of a model one takes more work: here both are within the limit, or beyond it
     let options = SystemOptions { relation_limit: 0, ..SystemOptions::default() };
     analyze_system(&model, options).unwrap_or_else(|e| panic!("{e}: {text}"))
 }

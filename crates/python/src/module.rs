@@ -22,7 +22,7 @@ use pyo3::types::{PyBytes, PyDict};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 create_exception!(
-    obsdeg._obsdeg,
+    obsdeg,
     ProblemError,
     PyValueError,
     "What is wrong with a request: `message`, and where, if it is in a text: `file`, `line`, `column` (counted from 1)."
