@@ -171,6 +171,40 @@ def test_texts_with_several_macros() -> None:
     assert exporters.to_si_jl(to_toml(second)).count("(1//2)*u(t)") + exporters.to_si_jl(to_toml(second)).count("u(t)*(1//2)") == 1
 
 
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        ("a*x(t)/b//c", "a*c*x/b"),
+        ("1/3//2*x(t)", "2*x/3"),
+        ("a/2x(t)", "a/(2*x)"),
+        ("a/2(x(t) + 1)", "a/(2*x + 2)"),
+        ("2^2x(t)", "2**(2*x)"),
+        ("2x(t)^3 - 3(a + b)", "-3*a - 3*b + 2*x**3"),
+        ("-2x(t)", "-2*x"),
+        ("1_000*x(t) + 0x1F + 1e3x(t) + 2f1", "2000*x + 51"),
+        ("pi*x(t)", "pi*x"),
+    ],
+)
+def test_precedence_of_julia(text: str, read: str) -> None:
+    """By the table of precedence in the manual of Julia."""
+    names = {n: sympy.Symbol(n) for n in ["a", "b", "c", "x", "pi"]}
+    rate = sijl.read(f"@ODEmodel(x'(t) = {text}, y(t) = x(t))").states["x"].rate
+    assert sympy.simplify(rate - sympy.sympify(read, locals=names)) == 0
+
+
+def test_parameters_that_cancel_stay() -> None:
+    """They are parameters in that tool, and not identifiable; `pi` is one like others."""
+    system = sijl.read("@ODEmodel(x'(t) = a*x(t)/a + b - b + 0*c + 2e5*u(t)*pi, y(t) = x(t))")
+    assert list(system.parameters) == ["a", "b", "c", "pi"] and list(system.known_inputs) == ["u"]
+    found = obsdeg.analyze(obsdeg.Model(to_toml(system)))
+    assert {q.name for q in found if q.degree is None} == {"a", "b", "c"}
+
+
+def test_what_stands_beside_a_model_is_noted() -> None:
+    system = sijl.read("ode = @ODEmodel(x'(t) = a*x(t), y(t) = x(t))\node = set_parameter_values(ode, Dict(a => 1))")
+    assert len(system.notes) == 1 and "set_parameter_values" in system.notes[0]
+
+
 LINES: list[tuple[Any, str, str, str]] = [
     (strike_goldd.read, "syms a\nx = a;\nfor i = 1:3\n y = a;\nend\nsave('m','x')", "line 3", "`for i = 1:3`"),
     (strike_goldd.read, "syms a\nx = a;\nf = besselj(a, 2);\nsave('m','x')", "line 3", "the function `besselj`"),
@@ -191,6 +225,9 @@ LINES: list[tuple[Any, str, str, str]] = [
     (sijl.read, "@DDSmodel(\n x'(t) = a*x(t),\n y(t) = x(t)\n)", "line 2", "`x'(t) = a*x(t)`"),
     (sijl.read, "@DDSmodel(\n x(t + 1) = t*x(t),\n y(t) = x(t)\n)", "line 2", "the time `t`"),
     (sijl.read, "ode = 1", "", "0 `@ODEmodel(`"),
+    (sijl.read, "@ODEmodel(\n 🐁'(t) = a*🐁(t),\n y(t) = 🐁(t)\n)", "line 2", "the sign `🐁`"),
+    (sijl.read, "@ODEmodel(\n x'(t) = a*x(t - 1),\n y(t) = x(t)\n)", "line 2", "`x(t - 1)`"),
+    (sijl.read, "@ODEmodel(\n x'(t) = a*x(0),\n y(t) = x(t)\n)", "line 2", "`x(0)`"),
     (sijl.read, "@ODEmodel(\n x'(t) = a*y(t),\n y(t) = x(t)\n)", "line 2", "the output `y`"),
     (sympy_system.read, "rates = {x: f(x)}\noutputs = {'y': x}", "line 1", "the function `f`"),
     (sympy_system.read, "import os\nos.remove('x')", "line 2", "`os.remove('x')`"),

@@ -127,31 +127,44 @@ def expand(expression: Expr, values: Mapping[str, Expr], what: str) -> Expr:
     raise ImportProblem(f"{what} through itself ({circle})", "rules that can be put into each other")
 
 
-def parse(text: str, *, calls: Mapping[str, Callable[..., Expr]] | None = None) -> Expr:
+def written_names(text: str) -> list[str]:
+    """Names in the text of a formula, in its order, without functions; also those that cancel."""
+    names = (m for m in _TOKEN.finditer(text) if m.group("name"))
+    return [m.group("name") for m in names if not text[m.end() :].lstrip().startswith("(")]
+
+
+def parse(text: str, *, calls: Mapping[str, Callable[..., Expr]] | None = None, julia: bool = False) -> Expr:
     """Reads ``+ - * / ^ **``, brackets, exact decimals, names and functions.
 
     Arguments:
         text: The formula.
         calls: Additional functions by name.
+        julia: True for the precedence of Julia, whose quotients ``//`` bind before ``*`` and ``/``; a number
+            directly in front of a name or bracket multiplies it before all these: ``a/2x`` is ``a/(2*x)``,
+            ``2^3x`` is ``2^(3*x)``. The name ``pi`` is one like others.
 
     Raises:
         ImportProblem: invalid formula, or too much work; the message names the construct.
     """
     if len(text) > FORMULA:
         raise OverLimit(f"a formula of {len(text)} characters", f"at most {FORMULA}")
-    return _Reader(text, {**_READ, **(calls or {})}).whole()
+    return _Reader(text, {**_READ, **(calls or {})}, julia).whole()
 
 
 class _Reader:
     """Formula from its tokens: numbers as expressions, all others as texts."""
 
-    def __init__(self, text: str, known: Mapping[str, Callable[..., Expr]]) -> None:
-        self.text, self.known = text, known
+    def __init__(self, text: str, known: Mapping[str, Callable[..., Expr]], julia: bool) -> None:
+        self.text, self.known, self.julia = text, known, julia
         self.tokens: list[Expr | str] = []
+        #: Tokens without a space before them.
+        self.close: set[int] = set()
         self.at = place = 0
         for match in _TOKEN.finditer(text):
             if match.start() != place:
                 raise self.refused()
+            if not match.group()[:1].isspace():
+                self.close.add(len(self.tokens))
             place = match.end()
             number = match.group("number")
             self.tokens.append(exact(number) if number else match.group("name") or match.group("sign"))
@@ -186,9 +199,9 @@ class _Reader:
         terms = []
         sign: str | None = "+"
         while sign:
-            factors = [self.factor(depth)]
+            factors = [self.quotient(depth)]
             while by := self.take("*", "/", "//"):
-                factor = self.factor(depth)
+                factor = self.quotient(depth)
                 factors.append(factor if by == "*" else 1 / factor)
             # SymPy distributes a number over a sum of two factors only; long products are formed in one step
             product = sympy.Mul(*factors) if len(factors) > LONG else reduce(mul, factors)
@@ -196,15 +209,31 @@ class _Reader:
             sign = self.take("+", "-")
         return terms[0] if len(terms) == 1 else sympy.Add(*terms)
 
+    def quotient(self, depth: int) -> Expr:
+        value = self.factor(depth)
+        while self.julia and self.take("//"):
+            value = value / self.factor(depth)
+        return value
+
     def factor(self, depth: int) -> Expr:
         minus = False
         while sign := self.take("+", "-"):
             minus ^= sign == "-"
         value = self.atom(depth)
-        if self.take("^", "**"):
+        if self.julia and self.is_coefficient():
+            self.hold(depth + 1, "coefficients")
+            value = value * self.factor(depth + 1)
+        elif self.take("^", "**"):
             self.hold(depth + 1, "powers")
             value = bounded_power(value, self.factor(depth + 1))
         return -value if minus else value
+
+    def is_coefficient(self) -> bool:
+        """True if the last token is a number, and a name or bracket follows without a space."""
+        if self.at not in self.close or self.at >= len(self.tokens) or isinstance(self.tokens[self.at - 1], str):
+            return False
+        token = self.tokens[self.at]
+        return isinstance(token, str) and (token == "(" or token[0].isalpha() or token[0] == "_")
 
     def atom(self, depth: int) -> Expr:
         if self.take("("):
@@ -217,13 +246,13 @@ class _Reader:
         token = self.tokens[self.at]
         self.at += 1
         if not isinstance(token, str):
-            if self.take("("):
+            if not (self.julia and self.at in self.close) and self.take("("):
                 raise ImportProblem(f"the function `{token}`", "one of " + ", ".join(sorted(self.known)))
             return token
         if not (token[0].isalpha() or token[0] == "_"):
             raise self.refused()
         if not self.take("("):
-            return sympy.pi if token == "pi" else sympy.Symbol(token)
+            return sympy.pi if token == "pi" and not self.julia else sympy.Symbol(token)
         arguments = []
         if not self.take(")"):
             arguments.append(self.sum(depth + 1))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from .formula import Expr, names_in, parse
+from .formula import Expr, names_in, parse, written_names
 from .limits import EQUATIONS, text_of_file
 from .problem import ImportProblem, OverLimit
 from .system import State, System
@@ -21,8 +21,13 @@ _LEFT = {
 }
 _EXPECTED = {"ODE": "x'(t) = ... or y(t) = ...", "DDS": "x(t + 1) = ... or y(t) = ..."}
 _OF_TIME = re.compile(r"([^\W\d][\w!]*)\s*\(\s*t\s*\)")
-# 2x, 3(a + b): a number in front multiplies; in 1e5*x the number is 1e5
-_COEFFICIENT = re.compile(r"(?<![\w.])((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)(?=[^\W\d]|\()")
+_OTHER_TIME = re.compile(r"([^\W\d][\w!]*)\s*\([^()]*\)")
+# numbers as Julia writes them: 1_000, 0x1F, 1f3
+_GROUPED = re.compile(r"(?<![\w.!])\d+(?:_\d+)+")
+_HEXADECIMAL = re.compile(r"(?<![\w.!])0x([0-9a-fA-F]+)\b")
+_SINGLE = re.compile(r"(?<![\w.!])(\d+(?:\.\d*)?)f([+-]?\d+)\b")
+#: Calls beside a model that change what is known.
+_BESIDE = ("set_parameter_values", "known_ic")
 
 
 def load(path: str | Path, *, model: int = 1) -> System:
@@ -62,6 +67,8 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
         place = f"line {line}"
         left, equals, right = equation.partition("=")
         found = _LEFT[kind].match(left)
+        if strange := re.search(r"[^\s\w!'()+*/^,.=-]", equation):
+            raise ImportProblem(f"the sign `{strange.group()}`", "names of letters, digits, _ and !", place=place)
         if not equals or not found:
             raise ImportProblem(f"`{' '.join(equation.split())}`", _EXPECTED[kind], place=place)
         label, state = found.groups()
@@ -72,8 +79,11 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
         of_time.update({m.group(1): place for m in _OF_TIME.finditer(right)})
 
     def formula(right: str, place: str) -> Expr:
+        for m in _OTHER_TIME.finditer(_OF_TIME.sub(r"\1", right)):
+            if m.group(1) in rates or m.group(1) in outputs or m.group(1) in of_time:
+                raise ImportProblem(f"`{m.group()}`", f"values at the time t, {m.group(1)}(t)", place=place)
         try:
-            expression = parse(_COEFFICIENT.sub(r"\1*", _OF_TIME.sub(r"\1", right)))
+            expression = parse(_numbers(_OF_TIME.sub(r"\1", right)), julia=True)
         except ImportProblem as problem:
             raise problem.located(place=place) from None
         if "t" in names_in(expression):
@@ -92,11 +102,19 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
     if not outputs:
         raise ImportProblem("no output", "y(t) = ...")
     system.known_inputs = {n: "generic" for n in of_time if n not in rates}
-    everything = names_in(*(s.rate for s in system.states.values()), *system.outputs.values())
-    order = [m for right, _ in [*rates.values(), *outputs.values()] for m in re.findall(r"[^\W\d][\w!]*", right)]
-    named_once = dict.fromkeys(n for n in order if n in everything and n not in rates and n not in system.known_inputs)
-    system.parameters = dict.fromkeys(named_once, "")
+    # a parameter that cancels is one still, and not identifiable
+    texts = [_numbers(_OF_TIME.sub("", right)) for right, _ in [*rates.values(), *outputs.values()]]
+    order = [name for right in texts for name in written_names(right)]
+    system.parameters = dict.fromkeys((n for n in order if n not in rates and n not in system.known_inputs), "")
+    if called := [call for call in _BESIDE if re.search(rf"\b{call}\b", text)]:
+        system.notes.append(f"{' and '.join(called)} beside the model are not read: values and starts are unknown")
     return system
+
+
+def _numbers(text: str) -> str:
+    """Text with decimal numbers for those that only Julia reads."""
+    text = _GROUPED.sub(lambda m: m.group().replace("_", ""), text)
+    return _SINGLE.sub(r"\1e\2", _HEXADECIMAL.sub(lambda m: str(int(m.group(1), 16)), text))
 
 
 def _equations(text: str, start: int) -> list[tuple[int, str]]:
