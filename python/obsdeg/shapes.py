@@ -1123,8 +1123,8 @@ class SystemCombination(Record):
     degree: int | None
     """Observable degree of the combination; null if it is not observable."""
     number_of_solutions: NumberOfSolutions | None
-    """Number of values of an identifiable function among all points with the same outputs; null of combinations that were asked for, and
-    if solutions were not sought.
+    """Number of values of an identifiable function among all points with the same outputs; null if it is not observable or solutions
+    were not sought.
     """
 
 

@@ -347,3 +347,55 @@ fn expressions_that_rest_on_what_is_local() {
     let table = crate::program::stdout(&crate::program::run(&["analyze", "--model", &file]));
     assert!(table.contains("2 solutions); in terms of others: see below"), "{table}");
 }
+
+/// Relations hold whatever the start is: the Goodwin oscillator with two known states. Its constants and x4
+/// have one solution without that knowledge too.
+#[test]
+fn known_starts_leave_relations_as_they_are() {
+    let goodwin = |start: &str| {
+        format!(
+            "name = \"goodwin\"\n[states]\n\
+             x1 = \"-b*x1 + 1/(c + x4)\"\n\
+             x2 = {{ equation = \"alpha*x1 - beta*x2\"{start} }}\n\
+             x3 = {{ equation = \"gamma*x2 - delta*x3\"{start} }}\n\
+             x4 = \"sigma*x4*(gamma*x2 - delta*x3)/x3\"\n\
+             [parameters]\n{}\n[outputs]\ny = \"x1\"\n",
+            ["b", "c", "alpha", "beta", "gamma", "delta", "sigma"].map(|p| format!("{p} = {{}}")).join("\n")
+        )
+    };
+    let options = SystemOptions { relation_limit: 1000, ..SystemOptions::default() };
+    for start in ["", ", initial = \"known\""] {
+        let model = model_file::read(&goodwin(start)).unwrap_or_else(|e| panic!("{e}"));
+        let found = analyze_system(&model, options).expect("judged");
+        let numbers = numbers(&found);
+        for name in ["b", "c", "sigma", "x1", "x4"] {
+            assert_eq!(numbers.get(name), Some(&1), "{start}: {name}");
+        }
+    }
+}
+
+/// Numbers of values of combinations that are asked for, by hand: a and b are exchangeable.
+#[test]
+fn combinations_that_are_asked_for_are_counted() {
+    let of = |discrete: &str, rates: [&str; 2]| {
+        let text = format!(
+            "name = \"m\"\n{discrete}combinations = [\"a + b\", \"a*b\", \"a - b\", \"a/b\", \"1/(a + b)\", \"a + k\", \"(a - b)^2\", \
+             \"a*u\", \"c*z\", \"c^2*z^2\", \"c\"]\n[states]\nx = \"{}\"\nw = \"{}\"\nz = \"0\"\n[parameters]\na = {{}}\nb = {{}}\nc = {{}}\n\
+             [constants]\nk = {{}}\n[known_inputs]\nu = \"generic\"\n[outputs]\ny = \"x + w + u\"\nv = \"c*z\"\n",
+            rates[0], rates[1]
+        );
+        let found = counted(&text);
+        let number = |n: &Option<NumberOfSolutions>| match n {
+            Some(NumberOfSolutions::Counted(k)) => format!("{k}"),
+            Some(NumberOfSolutions::Undecided(why)) if why.contains("known inputs") => "input".into(),
+            Some(NumberOfSolutions::Undecided(why)) if why.contains("later steps may") => "later".into(),
+            other => format!("{other:?}"),
+        };
+        found.combinations.iter().map(|c| number(&c.number_of_solutions)).collect::<Vec<_>>()
+    };
+    let expected = ["1", "1", "2", "2", "1", "2", "1", "input", "1", "1", "None"];
+    assert_eq!(of("", ["-a*x", "-b*w"]), expected);
+    // the input of a step is a known number there; of later steps nothing is known
+    let expected = ["1", "1", "later", "later", "1", "later", "1", "later", "1", "1", "None"];
+    assert_eq!(of("discrete = true\n", ["a*x", "b*w"]), expected);
+}

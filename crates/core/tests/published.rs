@@ -153,6 +153,63 @@ fn published_generators_are_identifiable() {
     assert!(asked > 490, "{asked}");
 }
 
+/// Verdicts that the tests, examples and texts of StructuralIdentifiability.jl and SIAN state, within the
+/// default limits: also discrete systems, several experiments, known starts, and functions asked for.
+#[test]
+fn nothing_contradicts_the_tests_of_other_programs() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/identifiability/suites.json");
+    let all: Value = serde_json::from_str(&std::fs::read_to_string(path).expect("the file")).expect("JSON");
+    let (mut agree, mut open, mut differ) = (0, 0, Vec::new());
+    for system in all["systems"].as_array().expect("a list") {
+        let (source, text) =
+            (system["source"].as_str().expect("a text"), system["model"].as_str().expect("a model"));
+        let list = |key: &str| system.get(key).map(names).unwrap_or_default();
+        let model = model_file::read(text).unwrap_or_else(|e| panic!("{source}: {e}"));
+        let keys = ["globally", "locally", "identifiable", "nonidentifiable", "functions"];
+        let is_unknown = |n: &&str| {
+            model.states.iter().any(|s| s.named.name == *n) || model.parameters.iter().any(|p| p.name == *n)
+        };
+        let mut asked: Vec<&str> = keys.iter().flat_map(|key| list(key)).filter(|n| !is_unknown(n)).collect();
+        asked.sort_unstable();
+        asked.dedup();
+        let (first, rest) = text.split_once('\n').expect("lines");
+        let asked = serde_json::to_string(&asked).expect("texts");
+        let model = model_file::read(&format!("{first}\ncombinations = {asked}\n{rest}"))
+            .unwrap_or_else(|e| panic!("{source}: {e}"));
+        let a = analyze_system(&model, SystemOptions::default()).unwrap_or_else(|e| panic!("{source}: {e}"));
+        // true if it is observable, and the number of its values if that is decided
+        let number = |n: &Option<NumberOfSolutions>| match n {
+            Some(NumberOfSolutions::OneByExpression) => Some(1),
+            Some(NumberOfSolutions::Counted(k)) => Some(*k),
+            _ => None,
+        };
+        let found = |name: &str| -> (bool, Option<usize>) {
+            let own = |n: &str| n == name || n.strip_suffix("@1") == Some(name);
+            if let Some(q) = a.quantities.iter().find(|q| own(&q.name)) {
+                return (q.degree.is_some(), number(&q.number_of_solutions));
+            }
+            match a.combinations.iter().find(|c| c.expression == name) {
+                Some(c) => (c.degree.is_some(), number(&c.number_of_solutions)),
+                None => (true, Some(1)), // a known start
+            }
+        };
+        for key in keys {
+            for name in list(key) {
+                match (key, found(name)) {
+                    ("nonidentifiable", (false, _))
+                    | ("globally" | "functions", (true, Some(1)))
+                    | ("locally", (true, Some(2..)))
+                    | ("identifiable", (true, _)) => agree += 1,
+                    ("globally" | "functions" | "locally", (true, None)) => open += 1,
+                    (_, other) => differ.push(format!("{source}: {name} is {key}, {other:?}")),
+                }
+            }
+        }
+    }
+    assert!(differ.is_empty(), "{differ:#?}");
+    assert_eq!((agree, open), (1030, 128));
+}
+
 /// Prints a table of all systems:
 /// `cargo test --release -p obsdeg-core --test published -- --ignored --nocapture`. `ONLY=name` selects
 /// those with a similar name, `LIMIT=millions` limits the work.

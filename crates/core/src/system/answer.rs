@@ -240,8 +240,8 @@ pub struct SystemCombination {
     pub expression: String,
     /// Observable degree of the combination; null if it is not observable.
     pub degree: Option<usize>,
-    /// Number of values of an identifiable function among all points with the same outputs; null of
-    /// combinations that were asked for, and if solutions were not sought.
+    /// Number of values of an identifiable function among all points with the same outputs; null if it is not
+    /// observable or solutions were not sought.
     pub number_of_solutions: Option<NumberOfSolutions>,
 }
 
@@ -358,11 +358,14 @@ pub(super) fn analyzed(model: &SystemModel, options: SystemOptions) -> Result<An
         count: options.count_limit.saturating_mul(1_000_000),
         relations: options.relation_limit.saturating_mul(1_000_000),
     };
-    let Solutions { counts, of_functions, order: counting_order, maps } =
+    let Solutions { counts, of_functions, of_asked, order: counting_order, maps } =
         values_taken(model, &compiled, &judged, &listed, (seed, limits));
     out.solution_maps = maps;
     for (function, count) in out.invariants.iter_mut().zip(of_functions) {
         function.number_of_solutions = Some(number_of_solutions(count, false));
+    }
+    for (asked, count) in out.combinations.iter_mut().zip(of_asked) {
+        asked.number_of_solutions = asked.degree.map(|_| number_of_solutions(count, false));
     }
     let single: Vec<bool> = counts.iter().map(|c| *c == Some(Ok(1))).collect();
     let (found, missing) = solutions(model, &compiled, &judged, seed, &single);

@@ -4,6 +4,7 @@
 use obsdeg_exact::groebner::RemainingWork;
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
+use super::constraints::slots_of;
 use super::dag::{Dag, Op};
 use super::fibre::{CountingPoint, Fibre, at_point};
 use super::function_factors::Factors;
@@ -49,6 +50,8 @@ pub(super) struct Solutions {
     pub(super) counts: Vec<Option<SolutionCount>>,
     /// Number of values of every function, on which both fields agree.
     pub(super) of_functions: Vec<SolutionCount>,
+    /// The same for the combinations that the model asks for.
+    pub(super) of_asked: Vec<SolutionCount>,
     /// Order of the derivatives of the outputs with which solutions were counted.
     pub(super) order: usize,
     /// Maps that take every solution to another, in words, if there are several solutions.
@@ -138,7 +141,7 @@ impl SolutionCounting<'_> {
         both.map(|both| self.agreed_number(both)).collect()
     }
 
-    /// Numbers of the functions on which both fields agree.
+    /// Numbers of the functions on which both fields agree, then of the combinations that the model asks for.
     fn agreed_functions(&self, fibres: &[Result<Fibre, NotCounted>; 2]) -> Vec<SolutionCount> {
         let [first, second] = fibres;
         let of = |i: usize| -> SolutionCount {
@@ -147,7 +150,7 @@ impl SolutionCounting<'_> {
                 second.as_ref().map_err(|e| *e)?.functions[i],
             ))
         };
-        (0..self.functions.len()).map(of).collect()
+        (0..self.functions.len() + self.compiled.combinations.len()).map(of).collect()
     }
 
     /// Solutions in both fields; in the second only if the first decides a number.
@@ -309,7 +312,8 @@ impl SolutionCounting<'_> {
         let pairs = maps.is_empty() && two;
         let mut found = [Err(NotCounted::OverLimit), Err(NotCounted::OverLimit)];
         // if the smaller count is not decided, the count with all unknowns is not either
-        if (pairs || !self.functions.is_empty()) && !self.is_open(counts) {
+        let functions = !self.functions.is_empty() || !self.compiled.combinations.is_empty();
+        if (pairs || functions) && !self.is_open(counts) {
             let stage = CountStage { whole: true, ..CountStage::new(0, limit) };
             found = self.both(stage, [&RelationConsequences::default(); 2]);
         }
@@ -349,13 +353,15 @@ pub(super) fn values_taken(
         let why = if compiled.dag.is_rational() { NotCounted::InDigits } else { NotCounted::NotRational };
         let none = degrees.degree.iter().map(|degree| degree.and(Some(Err(why))));
         let (counts, of_functions) = (none.collect(), vec![Err(why); functions.len()]);
-        return Solutions { counts, of_functions, order, maps: Vec::new() };
+        let of_asked = vec![Err(why); compiled.combinations.len()];
+        return Solutions { counts, of_functions, of_asked, order, maps: Vec::new() };
     };
     let counting = SolutionCounting { model, compiled, judged, fields, seed, order, functions };
     let mut counts = counting.by_stages(limits);
     let twins = counting.confirmed(&mut counts);
     let maps: Vec<String> = twins.iter().map(|t| t.words(compiled, &|role| role_name(model, role))).collect();
-    let (maps, of_functions) = counting.of_all(&counts, maps, limits.count);
+    let (maps, mut of_functions) = counting.of_all(&counts, maps, limits.count);
+    let of_asked = of_functions.split_off(functions.len());
     let advised = |count: SolutionCount| match count {
         Err(NotCounted::OverLimit) if limits.relations < ENOUGH * 1_000_000 => Err(NotCounted::InLittleWork),
         count => count,
@@ -364,7 +370,14 @@ pub(super) fn values_taken(
         counts.into_iter().zip(&degrees.degree).map(|(count, degree)| degree.and(Some(advised(count))));
     let counts: Vec<Option<SolutionCount>> = observable.collect();
     let of_functions = with_single(functions, of_functions, &counts);
-    Solutions { counts, of_functions, order, maps }
+    let is_single = |s: usize| match compiled.roles[s] {
+        Role::Constant(_) => true,
+        role => judged.layout.lane(role, 0).is_some_and(|lane| counts[lane] == Some(Ok(1))),
+    };
+    let single = |&node: &usize| slots_of(&compiled.dag, node).into_iter().all(is_single);
+    let of_asked = compiled.combinations.iter().zip(of_asked);
+    let of_asked = of_asked.map(|(node, count)| if single(node) { Ok(1) } else { count }).collect();
+    Solutions { counts, of_functions, of_asked, order, maps }
 }
 
 fn role_name(model: &SystemModel, role: Role) -> String {

@@ -468,7 +468,8 @@ fn recount(
         n.as_ref().is_some_and(|n| !matches!(n, Counted(1) | OneByExpression))
     };
     let unknowns = out.quantities.iter().any(|q| left(&q.number_of_solutions));
-    if !unknowns && !out.invariants.iter().any(|c| left(&c.number_of_solutions)) {
+    let functions = out.invariants.iter().chain(&out.combinations);
+    if !unknowns && !functions.into_iter().any(|c| left(&c.number_of_solutions)) {
         return Ok(last);
     }
     let further = last + 1;
@@ -477,8 +478,10 @@ fn recount(
         let again = more.quantities.iter().find(|other| other.name == q.name);
         fewer(&mut q.number_of_solutions, again.and_then(|q| q.number_of_solutions.clone()), last);
     }
-    for c in out.invariants.iter_mut().filter(|c| left(&c.number_of_solutions)) {
-        let again = more.invariants.iter().find(|other| other.expression == c.expression);
+    let listed = out.invariants.iter_mut().map(|c| (c, &more.invariants));
+    let asked = out.combinations.iter_mut().map(|c| (c, &more.combinations));
+    for (c, more) in listed.chain(asked).filter(|(c, _)| left(&c.number_of_solutions)) {
+        let again = more.iter().find(|other| other.expression == c.expression);
         fewer(&mut c.number_of_solutions, again.and_then(|c| c.number_of_solutions.clone()), last);
     }
     out.error_bound = out.error_bound.zip(more.error_bound).map(|(a, b)| a + b);

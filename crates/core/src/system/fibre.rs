@@ -448,7 +448,8 @@ pub(super) struct CountingPoint<'a> {
     pub(super) others: usize,
     /// Consequences of relations for the unknowns.
     pub(super) known: &'a RelationConsequences,
-    /// Functions whose values are counted too, together with all unknowns. For unknowns that are not
+    /// Functions whose values are counted too, together with all unknowns and the combinations that the model
+    /// asks for. For unknowns that are not
     /// observable these are the values while as many of them are fixed as there are unobservable directions.
     /// `None`: only observable unknowns.
     pub(super) functions: Option<&'a [Terms]>,
@@ -463,7 +464,7 @@ pub(super) struct Fibre {
     pub(super) polynomials: Vec<Result<Vec<u64>, NotCounted>>,
     /// True if all unknowns together take two values.
     pub(super) is_pair: bool,
-    /// Numbers of values of the functions.
+    /// Numbers of values of the functions, then of the combinations that the model asks for.
     pub(super) functions: Vec<Result<usize, NotCounted>>,
 }
 
@@ -521,12 +522,25 @@ pub(super) fn at_point(
     let two =
         |p: &Result<Vec<u64>, NotCounted>| p.as_ref().is_ok_and(|p| polynomial::distinct_roots(&f, p) == 2);
     let is_pair = polynomials.iter().any(two) && two(&ring.values(&joint, work));
-    let factors: Vec<Polynomial> =
+    let elements: Vec<Polynomial> =
         wanted.into_iter().chain(known.into_iter().map(Polynomial::constant)).collect();
-    let mut of_function = |terms: &Terms| -> Result<usize, NotCounted> {
-        let element = ring.function(terms, &factors, work)?;
-        Ok(polynomial::distinct_roots(&f, &ring.values(&element, work)?))
+    let number = |element: Result<Polynomial, NotCounted>, ring: &mut Quotients<'_>, work: &mut _| {
+        Ok(polynomial::distinct_roots(&f, &ring.values(&element?, work)?))
     };
-    let functions = at.functions.unwrap_or_default().iter().map(&mut of_function).collect();
+    let mut functions = Vec::new();
+    if let Some(terms) = at.functions {
+        for terms in terms {
+            let element = ring.function(terms, &elements, work);
+            functions.push(number(element, &mut ring, work));
+        }
+        for &asked in &compiled.combinations {
+            let slot = |s: usize| {
+                let factor = factors.of_role(compiled.roles[s], &judged.layout, 0)?;
+                elements.get(factor).cloned()
+            };
+            let element = ring.node(&compiled.dag, asked, slot, work);
+            functions.push(number(element, &mut ring, work));
+        }
+    }
     Ok(Fibre { values: own, polynomials, is_pair, functions })
 }

@@ -1,11 +1,16 @@
 //! Values of rational functions of the unknowns among all solutions: their minimal polynomials in the
 //! quotient ring of the equations.
 
+use std::collections::BTreeMap;
+
 use obsdeg_exact::Field;
 use obsdeg_exact::groebner::{GroebnerBasis, RemainingWork};
 use obsdeg_exact::multivariate::Polynomial;
 
+use super::constraints::below;
+use super::dag::{Dag, Op};
 use super::undecided::{NotCounted, SOLUTIONS};
+use super::values::Values;
 
 /// Limit of the work of one remainder by an unfinished basis.
 const REMAINDER: u64 = 100_000;
@@ -89,5 +94,37 @@ impl Quotients<'_> {
             sum.add_scaled(&f, &product, f.one());
         }
         Ok(sum)
+    }
+
+    /// Element of the ring for a node of the graph, given the elements of the slots.
+    pub(super) fn node(
+        &mut self,
+        dag: &Dag,
+        node: usize,
+        slot: impl Fn(usize) -> Option<Polynomial>,
+        work: &mut RemainingWork,
+    ) -> Result<Polynomial, NotCounted> {
+        let f = self.f;
+        let mut found: BTreeMap<usize, Polynomial> = BTreeMap::new();
+        for i in below(dag, node) {
+            let element = match dag.ops[i] {
+                Op::Number { mantissa, decimals } => Polynomial::constant(f.number(mantissa, decimals)),
+                Op::Slot(s) => slot(s).ok_or(NotCounted::KnownSignal)?,
+                Op::Add(a, b) | Op::Subtract(a, b) => {
+                    let minus = matches!(dag.ops[i], Op::Subtract(..));
+                    let mut sum = found[&a].clone();
+                    sum.add_scaled(&f, &found[&b], if minus { f.neg(f.one()) } else { f.one() });
+                    sum
+                }
+                Op::Multiply(a, b) => self.product(&found[&a], &found[&b], work)?,
+                Op::Divide(a, b) => {
+                    let inverse = self.inverse(&found[&b], work)?;
+                    self.product(&found[&a], &inverse, work)?
+                }
+                Op::Primitive { .. } | Op::Pi => return Err(NotCounted::NotRational),
+            };
+            found.insert(i, element);
+        }
+        found.remove(&node).ok_or(NotCounted::NoPoint)
     }
 }

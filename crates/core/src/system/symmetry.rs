@@ -6,7 +6,7 @@ use obsdeg_exact::{Reals, RowSpace, SplitMix64};
 use super::error::ModelError;
 use super::functions::gcd;
 use super::judge::{Judgement, PointDegrees, climb_at};
-use super::model::{Compiled, SystemModel};
+use super::model::{Compiled, Role, SystemModel};
 use super::values::Values;
 use super::work::{Spent, WorkLimit, product};
 use crate::degree::sparse::{extend_by_short_vectors, products_of_short_vectors, support_in};
@@ -210,7 +210,9 @@ fn symmetries_in<S: Values>(
     if out.found.len() + out.polynomial.len() < defect {
         out.unexplained = search.unexplained(&at, &mut tangents);
     }
-    out.invariants = invariants(&search.f, n, &out.found, &at, &mut search.budget);
+    let is_parameter: Vec<bool> =
+        judged.layout.unknowns.iter().map(|u| matches!(u.role, Role::Parameter(_))).collect();
+    out.invariants = invariants(&search.f, &is_parameter, &out.found, &at, &mut search.budget);
     out.invariants.retain(|i| i.terms.iter().all(|t| judged.shown(model, t.0)));
     (out.stopped, out.work) = (search.budget.stopped(), search.budget.spent);
     Ok(out)
@@ -491,14 +493,15 @@ fn products(factors: &[usize], degree: usize) -> Vec<Vec<usize>> {
 }
 
 /// Products of powers that every scaling leaves unchanged, and sums that every translation leaves unchanged,
-/// as far as they are observable.
+/// as far as they are observable: those of parameters alone first.
 fn invariants<S: Values>(
     f: &S,
-    n: usize,
+    is_parameter: &[bool],
     found: &[Symmetry],
     at: &PointDegrees<S>,
     budget: &mut WorkBudget,
 ) -> Vec<Invariant> {
+    let n = is_parameter.len();
     let mut out = Vec::new();
     let scalings: Vec<&Symmetry> = found.iter().filter(|s| s.translation.is_empty()).collect();
     let translations: Vec<&Symmetry> = found.iter().filter(|s| s.scaling.is_empty()).collect();
@@ -515,10 +518,20 @@ fn invariants<S: Values>(
             }
             rows.insert(&row);
         }
-        // null vectors of unknowns that do not change are unit vectors
-        let kept: Vec<Vec<S::Element>> =
-            rows.null_space().into_iter().filter(|v| support_in(f, v).iter().all(|&c| moved[c])).collect();
-        for m in budget.short_vectors(f, &kept, &rows, &mut space()) {
+        let mut of_parameters = rows.clone();
+        for c in (0..n).filter(|&c| !is_parameter[c]) {
+            let unit: Vec<_> = (0..n).map(|j| if j == c { f.one() } else { f.zero() }).collect();
+            of_parameters.insert(&unit);
+        }
+        let mut span = space();
+        let mut vectors = Vec::new();
+        for rows in [&of_parameters, &rows] {
+            // null vectors of unknowns that do not change are unit vectors
+            let is_moved = |v: &Vec<S::Element>| support_in(f, v).iter().all(|&c| moved[c]);
+            let kept: Vec<Vec<S::Element>> = rows.null_space().into_iter().filter(is_moved).collect();
+            vectors.extend(budget.short_vectors(f, &kept, rows, &mut span));
+        }
+        for m in vectors {
             let Some(k) = rationals(f, &m) else { continue };
             let exponents = integers(&k);
             // d(prod x^m) = prod x^m sum m_i dx_i / x_i

@@ -57,6 +57,11 @@ pub(super) enum NotCounted {
     /// The numbers at two points differ.
     #[error("two random points disagree")]
     Disagree,
+    /// A function contains a known input or start.
+    #[error(
+        "values are counted of functions of unknowns and known constants, without known inputs and starts"
+    )]
+    KnownSignal,
     /// No point was found.
     #[error("no random point could be used")]
     NoPoint,

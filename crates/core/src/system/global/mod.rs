@@ -23,7 +23,7 @@ use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
 use super::judge::Judgement;
-use super::model::{Compiled, SystemModel};
+use super::model::{Compiled, StateStart, SystemModel};
 use integrals::relations_along;
 use jets::JetSource;
 use ratios::{CoefficientRatio, Pool, ratios};
@@ -60,9 +60,10 @@ pub(super) struct ModelRelations {
 }
 
 /// True if relations among derivatives can decide anything: one experiment and segment, generic starts and
-/// inputs, no function.
+/// inputs, no function. Relations hold whatever the start, so it may be known.
 pub(super) fn applies(model: &SystemModel, compiled: &Compiled, judged: &Judgement) -> bool {
-    let generic = judged.layout.closed && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
+    let starts = model.states.iter().all(|s| matches!(s.start, StateStart::Unknown | StateStart::Known));
+    let generic = starts && compiled.segments.len() <= 1 && compiled.constraints.is_empty();
     // a relation that contains the time would hold at one time only
     let autonomous = compiled.dag.is_rational() && !compiled.uses_time();
     generic
