@@ -77,11 +77,13 @@ fn counting(a: &SystemAnalysis) -> Vec<String> {
         ));
     }
     let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
-    for q in &a.quantities {
-        if let Some(NumberOfSolutions::Undecided(reason)) = &q.number_of_solutions {
+    let unknowns = a.quantities.iter().map(|q| (&q.name, &q.number_of_solutions));
+    let asked = a.combinations.iter().map(|c| (&c.expression, &c.number_of_solutions));
+    for (name, number) in unknowns.chain(asked) {
+        if let Some(NumberOfSolutions::Undecided(reason)) = number {
             match reasons.iter_mut().find(|r| r.0 == reason) {
-                Some((_, names)) => names.push(&q.name),
-                None => reasons.push((reason, vec![&q.name])),
+                Some((_, names)) => names.push(name),
+                None => reasons.push((reason, vec![name])),
             }
         }
     }
@@ -253,9 +255,6 @@ fn assumed(a: &SystemAnalysis) -> Vec<String> {
     ));
     if !a.branches.is_empty() {
         assumed.push(branch(a));
-    }
-    if !a.combinations.is_empty() {
-        assumed.push("the number of solutions of a combination that is asked for is not counted".into());
     }
     assumed.extend(counting(a));
     assumed.extend(a.note.clone());
