@@ -67,7 +67,7 @@ def read(text: str, *, model: int = 1, name: str = "model") -> System:
         place = f"line {line}"
         left, equals, right = equation.partition("=")
         found = _LEFT[kind].match(left)
-        if strange := re.search(r"[^\s\w!'()+*/^,.=-]", equation):
+        if strange := re.search(r"[^\s\w!'()+*/^,.=-]+", equation):
             raise ImportProblem(f"the sign `{strange.group()}`", "names of letters, digits, _ and !", place=place)
         if not equals or not found:
             raise ImportProblem(f"`{' '.join(equation.split())}`", _EXPECTED[kind], place=place)
