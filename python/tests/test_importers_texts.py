@@ -193,7 +193,7 @@ def test_precedence_of_julia(text: str, read: str) -> None:
 
 
 def test_parameters_that_cancel_stay() -> None:
-    """They are parameters in that tool, and not identifiable; `pi` is one like others."""
+    """Parameters that cancel are parameters in StructuralIdentifiability.jl, not identifiable; so is `pi`."""
     system = sijl.read("@ODEmodel(x'(t) = a*x(t)/a + b - b + 0*c + 2e5*u(t)*pi, y(t) = x(t))")
     assert list(system.parameters) == ["a", "b", "c", "pi"] and list(system.known_inputs) == ["u"]
     found = obsdeg.analyze(obsdeg.Model(to_toml(system)))
