@@ -374,6 +374,19 @@ fn known_starts_leave_relations_as_they_are() {
     }
 }
 
+/// Known inputs and starts have one value; a start that is given by a parameter has those of the parameter.
+#[test]
+fn combinations_of_known_values() {
+    let text = "name = \"m\"\ncombinations = [\"x^2\", \"a*x\", \"a*u\", \"q*x\", \"w\"]\n[states]\n\
+                x = { equation = \"-a*x^2\", initial = \"known\" }\nw = { equation = \"0\", initial = \"q\" }\n\
+                [parameters]\na = {}\nq = {}\n[known_inputs]\nu = \"generic\"\n\
+                [outputs]\ny = \"x + u\"\nv = \"w^2\"\n";
+    let found = counted(text);
+    let is_one = |n: &Option<NumberOfSolutions>| matches!(n, Some(NumberOfSolutions::Counted(1)));
+    let single: Vec<bool> = found.combinations.iter().map(|c| is_one(&c.number_of_solutions)).collect();
+    assert_eq!(single, [true, true, true, false, false], "{found:#?}");
+}
+
 /// Numbers of values of combinations that are asked for, by hand: a and b are exchangeable.
 #[test]
 fn combinations_that_are_asked_for_are_counted() {

@@ -11,7 +11,7 @@ use super::function_factors::Factors;
 use super::global::{self, ModelRelations, RelationConsequences};
 use super::judge::Judgement;
 use super::maps::second_solution;
-use super::model::{Compiled, KnownInput, Role, SystemModel};
+use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::quotients::Terms;
 use super::rows::SystemRows;
 use super::twins::{Twin, images, twins};
@@ -371,7 +371,9 @@ pub(super) fn values_taken(
     let counts: Vec<Option<SolutionCount>> = observable.collect();
     let of_functions = with_single(functions, of_functions, &counts);
     let is_single = |s: usize| match compiled.roles[s] {
-        Role::Constant(_) => true,
+        Role::Constant(_) | Role::KnownInput(_) | Role::Time => true,
+        // a start that is given may contain parameters
+        Role::State(i) if model.states[i].start == StateStart::Known => true,
         role => judged.layout.lane(role, 0).is_some_and(|lane| counts[lane] == Some(Ok(1))),
     };
     let single = |&node: &usize| slots_of(&compiled.dag, node).into_iter().all(is_single);

@@ -523,25 +523,27 @@ fn invariants<S: Values>(
             let unit: Vec<_> = (0..n).map(|j| if j == c { f.one() } else { f.zero() }).collect();
             of_parameters.insert(&unit);
         }
-        let mut span = space();
-        let mut vectors = Vec::new();
-        for rows in [&of_parameters, &rows] {
-            // null vectors of unknowns that do not change are unit vectors
-            let is_moved = |v: &Vec<S::Element>| support_in(f, v).iter().all(|&c| moved[c]);
-            let kept: Vec<Vec<S::Element>> = rows.null_space().into_iter().filter(is_moved).collect();
-            vectors.extend(budget.short_vectors(f, &kept, rows, &mut span));
-        }
-        for m in vectors {
-            let Some(k) = rationals(f, &m) else { continue };
-            let exponents = integers(&k);
+        let invariant = |m: &[S::Element]| -> Option<Invariant> {
+            let exponents = integers(&rationals(f, m)?);
             // d(prod x^m) = prod x^m sum m_i dx_i / x_i
             let factor = |x| if product { f.inverse(x) } else { Some(f.one()) };
             let gradient: Option<Vec<S::Element>> = (exponents.iter().zip(&at.values))
                 .map(|(&m, x)| if m == 0 { Some(f.zero()) } else { Some(f.mul(&f.integer(m), &factor(x)?)) })
                 .collect();
-            if let Some(degree) = gradient.and_then(|g| at.degree(&g)) {
-                let terms = exponents.iter().copied().enumerate().filter(|t| t.1 != 0).collect();
-                out.push(Invariant { terms, product, degree });
+            let degree = at.degree(&gradient?)?;
+            let terms = exponents.iter().copied().enumerate().filter(|t| t.1 != 0).collect();
+            Some(Invariant { terms, product, degree })
+        };
+        let mut span = space();
+        for rows in [&of_parameters, &rows] {
+            // null vectors of unknowns that do not change are unit vectors
+            let is_moved = |v: &Vec<S::Element>| support_in(f, v).iter().all(|&c| moved[c]);
+            let kept: Vec<Vec<S::Element>> = rows.null_space().into_iter().filter(is_moved).collect();
+            for m in budget.short_vectors(f, &kept, rows, &mut span.clone()) {
+                if let Some(found) = invariant(&m) {
+                    span.insert(&m);
+                    out.push(found);
+                }
             }
         }
     }
