@@ -1,5 +1,6 @@
-//! Tests of the workbench in a real browser: `cargo test --workspace --test page`, after `cargo run -p
-//! obsdeg-web` has built the page, which takes minutes. `cargo test` leaves them out.
+//! Tests of the workbench in a real browser: `cargo test --workspace --test page`. They drive a draft, whose
+//! engine is a program, or, once `cargo run -p obsdeg-web` has built the page in minutes, the page itself.
+//! `cargo test` leaves them out.
 
 #[path = "../it/browser.rs"]
 mod browser;

@@ -1,7 +1,8 @@
 //! The page of `crates/web` in a real browser, from disk: actions of its tests.
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
@@ -13,46 +14,61 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Opens the page, built from the current sources. `None` if it was never built here (`cargo run -p
-/// obsdeg-web`, minutes of compilation for another target), or without the target or a browser.
+/// Page under test.
+struct Page {
+    path: PathBuf,
+    /// Program that answers a draft's questions until its input, which it shares with the tests, ends.
+    _engine: Option<Child>,
+}
+
+/// Builds the page from the current sources: as users have it if it was built here before (`cargo run -p
+/// obsdeg-web`, minutes of compilation for another target), else a draft, whose engine is the program that
+/// writes it.
+fn page() -> Page {
+    // with the features of the whole workspace, so that nothing is compiled again
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let built = Command::new(cargo)
+        .args(["build", "-q", "--workspace", "--bin", "workbench"])
+        .current_dir(root())
+        .status();
+    assert!(built.expect("cargo runs").success(), "the builder of the page is built");
+    let mut builder = Command::new(Path::new(env!("CARGO_BIN_EXE_obsdeg")).with_file_name("workbench"));
+    builder.current_dir(root());
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    if root().join("target/workbench.html").is_file() {
+        let path = folder.join("workbench.html");
+        assert!(builder.arg(&path).status().expect("it runs").success(), "the page is built");
+        return Page { path, _engine: None };
+    }
+    let path = folder.join("draft.html");
+    let mut engine = builder
+        .arg("--draft")
+        .arg(&path)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the draft is written");
+    let mut said = String::new();
+    let out = engine.stdout.as_mut().expect("a pipe");
+    BufReader::new(out).read_line(&mut said).expect("a line");
+    assert!(said.contains("the engine is this program"), "{said}");
+    Page { path, _engine: Some(engine) }
+}
+
+/// True if the page under test is the one that users have, with the engine as WebAssembly.
+pub(crate) fn is_built(page: &Path) -> bool {
+    page.file_name().is_some_and(|name| name == "workbench.html")
+}
+
+/// Opens the page. `None` without a browser.
 #[expect(clippy::print_stderr, reason = "a skipped test says why")]
 pub(crate) fn opened(width: u32) -> Option<(Browser, &'static Path)> {
-    static PAGE: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let built = PAGE.get_or_init(|| {
-        let libraries = Command::new("rustc")
-            .args(["--print", "target-libdir", "--target", "wasm32-unknown-unknown"])
-            .output()
-            .ok()?;
-        if !Path::new(String::from_utf8_lossy(&libraries.stdout).trim()).is_dir() {
-            return None;
-        }
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-        if !root().join("target/workbench.html").is_file() {
-            return None;
-        }
-        let page = folder.join("workbench.html");
-        // with the features of the whole workspace, so that nothing is compiled again
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let built = Command::new(cargo)
-            .args(["build", "-q", "--workspace", "--bin", "workbench"])
-            .current_dir(root())
-            .status();
-        assert!(built.expect("cargo runs").success(), "the builder of the page is built");
-        let builder = Path::new(env!("CARGO_BIN_EXE_obsdeg")).with_file_name("workbench");
-        let built = Command::new(builder).arg(&page).current_dir(root()).status();
-        assert!(built.expect("it runs").success(), "the page is built");
-        Some(page)
-    });
-    let Some(page) = built.as_deref() else {
-        eprintln!(
-            "skipped: the page is not built (rustup target add wasm32-unknown-unknown, cargo run -p obsdeg-web)"
-        );
-        return None;
-    };
+    static PAGE: OnceLock<Page> = OnceLock::new();
     let Some(mut browser) = Browser::start() else {
         eprintln!("skipped: no Chromium on this machine");
         return None;
     };
+    let page = &PAGE.get_or_init(page).path;
     browser.open(page, width, 1000);
     ready(&mut browser);
     Some((browser, page))
@@ -181,7 +197,8 @@ pub(crate) fn names(browser: &mut Browser) -> Value {
     browser.value("[...document.querySelectorAll('#positions .name')].map(b => b.textContent)")
 }
 
-/// Asserts that the page wrote nothing to the console and made no network request.
+/// Asserts that the page wrote nothing to the console and made no network request (a draft's worker asks its
+/// engine, which the page itself does not).
 pub(crate) fn quiet(browser: &Browser) {
     for event in &browser.events {
         let (method, of) = (event["method"].as_str().unwrap_or_default(), &event["params"]);
@@ -190,7 +207,8 @@ pub(crate) fn quiet(browser: &Browser) {
         }
         if method == "Network.requestWillBeSent" {
             let url = of["request"]["url"].as_str().unwrap_or_default();
-            let own = url.starts_with("data:") || url.starts_with("blob:") || url.contains("workbench.html");
+            let page = ["workbench.html", "draft.html"].iter().any(|name| url.contains(name));
+            let own = url.starts_with("data:") || url.starts_with("blob:") || page;
             assert!(own, "{url}");
         }
     }

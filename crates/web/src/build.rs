@@ -16,6 +16,8 @@ use wasm_bindgen_cli_support::Bindgen;
 const TEMPLATE: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/page.css");
 const WORKER: &str = include_str!("../page/worker.js");
+/// Script that stands for the engine in a draft.
+const DRAFT: &str = include_str!("../page/draft.js");
 /// Scripts of the page, in the order in which they run.
 const SCRIPTS: [&str; 12] = [
     include_str!("../page/engine.js"),
@@ -58,18 +60,64 @@ struct WasmModule {
     script: String,
 }
 
+/// Engine of a page, as its worker takes it.
+struct PageEngine {
+    /// Script that the worker calls the engine by.
+    script: String,
+    /// Module that unpacks the engine, as text.
+    unpack: String,
+    /// Packed engine, as text.
+    packed: String,
+    /// Source beside `blob:` and `data:` that the page may ask, for its content security policy.
+    connect: Option<String>,
+}
+
 /// Writes the page; returns its path and sizes in words.
 pub(crate) fn page(asked: Option<PathBuf>) -> Result<String, BuildError> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let compiled = compile(&root)?;
+    let compiled = compile(&root())?;
     let engine = glued(&compiled, "obsdeg_web")?;
     let unpack = glued(&compiled, "obsdeg_unpack")?;
     let packed = packed(&engine.wasm)?;
+    let [whole, small] = [engine.wasm.len(), packed.len()].map(|n| n as f64 / 1e6);
+    let (path, length) = written(
+        asked,
+        "workbench.html",
+        &PageEngine {
+            script: format!("{}\n{}", unpack.script, engine.script),
+            unpack: as_text(&unpack.wasm),
+            packed: as_text(&packed),
+            connect: None,
+        },
+    )?;
+    let all = length as f64 / 1e6;
+    Ok(format!("{}: {all:.2} MB; the engine {whole:.2} MB, packed {small:.2} MB", path.display()))
+}
+
+/// Writes a draft of the page, which asks the program at `address`; returns its path.
+pub(crate) fn draft(asked: Option<PathBuf>, address: &str) -> Result<PathBuf, BuildError> {
+    let mut environment = Environment::new();
+    environment.add_template("draft", DRAFT)?;
+    let engine = PageEngine {
+        script: environment.get_template("draft")?.render(context! { address })?,
+        unpack: as_text(&[]),
+        packed: as_text(&[]),
+        connect: Some(address.into()),
+    };
+    Ok(written(asked, "draft.html", &engine)?.0)
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// Writes a page with an engine; returns its path and number of bytes.
+fn written(asked: Option<PathBuf>, name: &str, engine: &PageEngine) -> Result<(PathBuf, usize), BuildError> {
+    let root = root();
     let script = format!("'use strict';(() => {{\n{}\n}})();", SCRIPTS.join("\n"));
     let data = json!({
-        "worker": format!("{}\n{}\n{WORKER}", unpack.script, engine.script),
-        "unpack": as_text(&unpack.wasm),
-        "engine": as_text(&packed),
+        "worker": format!("{}\n{WORKER}", engine.script),
+        "unpack": engine.unpack,
+        "engine": engine.packed,
         "version": env!("CARGO_PKG_VERSION"),
         "examples": examples(&root)?,
     });
@@ -80,15 +128,15 @@ pub(crate) fn page(asked: Option<PathBuf>) -> Result<String, BuildError> {
         style_digest => digest(STYLE),
         script => &script,
         script_digest => digest(&script),
+        connect => engine.connect,
         version => env!("CARGO_PKG_VERSION"),
         // without `<`, no text in the data ends the script element
         data => data.to_string().replace('<', "\\u003c"),
     })?;
-    let path = asked.unwrap_or_else(|| root.join("target/workbench.html"));
+    let path = asked.unwrap_or_else(|| root.join("target").join(name));
     fs::write(&path, &text)
         .map_err(|reason| BuildError::File { path: path.display().to_string(), reason })?;
-    let [all, whole, small] = [text.len(), engine.wasm.len(), packed.len()].map(|n| n as f64 / 1e6);
-    Ok(format!("{}: {all:.2} MB; the engine {whole:.2} MB, packed {small:.2} MB", path.display()))
+    Ok((path, text.len()))
 }
 
 /// Compiles the engine and the unpacking module; returns the paths of the WebAssembly files.
