@@ -1,7 +1,7 @@
 //! Laws that hold for every scheme, on random schemes.
 
 use obsdeg_core::analysis::{AnalysisError, AnalysisOptions, analyze};
-use obsdeg_core::degree::{Degrees, DerivativeRows, Status, climb, judge, staircase};
+use obsdeg_core::degree::{Degrees, DerivativeRows, Status, climb, filtration, judge};
 use obsdeg_core::model::{Angle, Carry, Platform, RandomValues, Scheme};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 use proptest::prelude::*;
@@ -107,7 +107,7 @@ proptest! {
         let mut rng = SplitMix64::new(seed);
         let values = RandomValues::draw(platform.scheme(), &mut rng).expect("fits");
         let sample = values.sample(platform.scheme(), 1);
-        let plain = staircase(&platform, &sample).0;
+        let plain = filtration(&platform, &sample).0;
         let f = sample.roots.field;
         let scale = (0..platform.names().len()).map(|_| 1 + rng.below(f.modulus() - 1)).collect();
         let inner = obsdeg_core::degree::PlatformRows::new(&platform, &sample);

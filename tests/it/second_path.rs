@@ -3,7 +3,7 @@
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
-use obsdeg_core::degree::{Degrees, DerivativeRows, climb, staircase};
+use obsdeg_core::degree::{Degrees, DerivativeRows, climb, filtration};
 use obsdeg_core::language::{Environment, evaluate, parse};
 use obsdeg_core::model::{Carry, Platform, RandomValues, Scheme};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
@@ -258,7 +258,7 @@ fn engine(tangents: &[[(i64, i64); 3]], carry: Carry, rng: &mut SplitMix64) -> D
             assert!(values.set_half_tangent(&format!("a{i}x{k}"), image));
         }
     }
-    staircase(&platform, &values.sample(platform.scheme(), 1)).0
+    filtration(&platform, &values.sample(platform.scheme(), 1)).0
 }
 
 /// 240 random schemes at rational points of the unit circle, special angles (0, 90, -90 degrees) included:
@@ -469,7 +469,7 @@ fn text_equations_in_both_axes_give_the_same_verdicts() {
                 attitudes.iter().map(|a| obsdeg_core::model::parse_attitude(a).expect("an attitude"));
             let platform = Platform::new(Scheme { carry, ..Scheme::of_angles(angles) }).expect("valid");
             let values = RandomValues::draw(platform.scheme(), &mut SplitMix64::new(5)).expect("fits");
-            let built_in = staircase(&platform, &values.sample(platform.scheme(), 1)).0;
+            let built_in = filtration(&platform, &values.sample(platform.scheme(), 1)).0;
             for in_n in [true, false] {
                 let (profile, degree) = from_text(in_n, attitudes, carry, 5);
                 // orders beyond the last that can add rows repeat the rank

@@ -82,7 +82,7 @@ impl Accuracy {
     /// [`AccuracyError`].
     pub fn new(platform: &Platform, verdicts: &Verdicts, seed: u64) -> Result<Self, AccuracyError> {
         let scheme = platform.scheme();
-        if scheme.by_course() {
+        if scheme.by_history() {
             return Err(AccuracyError::Rotation);
         }
         if scheme.carry == Carry::Reset || scheme.unknowns == Unknowns::Drift {

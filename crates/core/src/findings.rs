@@ -5,8 +5,8 @@ use obsdeg_symbolic::Worker;
 
 use crate::accuracy::{Accuracy, AccuracyError};
 use crate::degree::ensemble::{EnsembleError, Verdicts, judge};
+use crate::degree::filtration::partners;
 use crate::degree::findings::{ByPrimes, Findings};
-use crate::degree::staircase::partners;
 use crate::degree::status::{Status, Verdict};
 use crate::model::scheme::MAX_UNKNOWNS;
 use crate::model::{Platform, SchemeError};
@@ -133,7 +133,7 @@ impl<'a> JudgedScheme<'a> {
         let primes = [0, 1].map(|i| verdicts.values[i].roots().field.modulus());
         SchemeFindings {
             verdicts: Findings {
-                partners: partners(verdicts.degrees.degree.len(), &verdicts.stairs),
+                partners: partners(verdicts.degrees.degree.len(), &verdicts.spans),
                 degrees: verdicts.degrees.clone(),
                 asked: requested.iter().map(|r| r.verdict).collect(),
                 seed: *seed,

@@ -32,7 +32,7 @@
 //! # Ok::<(), obsdeg_core::system::ModelError>(())
 //! ```
 //!
-//! Data flow: a model ([`model`], [`system`]) gives derivative rows, the rows a staircase and verdicts
+//! Data flow: a model ([`model`], [`system`]) gives derivative rows, the rows a filtration and verdicts
 //! ([`degree`]), these sparse combinations, a null space and solutions ([`solution`]), and with dwells
 //! accuracy orders ([`accuracy`]). All findings form one exact value ([`findings`]); an
 //! [`analysis::Analysis`] is its view in words. No module imports from one that comes after it here.

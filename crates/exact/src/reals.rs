@@ -61,11 +61,11 @@ impl<const N: usize> Scalars for Reals<N> {
         sums: &mut [BallSum<N>],
         _: &mut usize,
         factor: &Ball<N>,
-        lanes: &[u32],
+        components: &[u32],
         row: &[Ball<N>],
     ) {
-        for (&lane, x) in lanes.iter().zip(row) {
-            sums[lane as usize].add_product(factor, x);
+        for (&component, x) in components.iter().zip(row) {
+            sums[component as usize].add_product(factor, x);
         }
     }
     fn reduce(&self, sum: &BallSum<N>) -> Ball<N> {

@@ -41,13 +41,13 @@ pub trait Scalars: Clone + Debug {
         Self::Element: 'a;
     /// The empty sum.
     fn no_sum(&self) -> Self::Sum;
-    /// Adds `factor row_i` to `sums[lanes[i]]`; `pending` counts products since the sums were settled.
+    /// Adds `factor row_i` to `sums[components[i]]`; `pending` counts products since the sums were settled.
     fn gather(
         &self,
         sums: &mut [Self::Sum],
         pending: &mut usize,
         factor: &Self::Element,
-        lanes: &[u32],
+        components: &[u32],
         row: &[Self::Element],
     );
     /// The value of a sum.
@@ -149,20 +149,20 @@ impl Scalars for Field {
         0
     }
     #[inline]
-    fn gather(&self, sums: &mut [u128], pending: &mut usize, factor: &u64, lanes: &[u32], row: &[u64]) {
+    fn gather(&self, sums: &mut [u128], pending: &mut usize, factor: &u64, components: &[u32], row: &[u64]) {
         if *pending == Self::LAZY {
             sums.iter_mut().for_each(|s| *s = self.settle(*s));
             *pending = 0;
         }
         *pending += 1;
-        if lanes.len() == sums.len() {
+        if components.len() == sums.len() {
             for (s, &x) in sums.iter_mut().zip(row) {
                 *s += self.lazy(*factor, x);
             }
             return;
         }
-        for (&lane, &x) in lanes.iter().zip(row) {
-            sums[lane as usize] += self.lazy(*factor, x);
+        for (&component, &x) in components.iter().zip(row) {
+            sums[component as usize] += self.lazy(*factor, x);
         }
     }
     #[inline]

@@ -44,7 +44,7 @@ async function verdictsNow() {
     put($('summary'), NOT_JUDGED);
     return failed(problem);
   };
-  const found = await live.ask('verdicts', [request], { lane: 'verdicts' }).catch(ended).finally(() => clearTimeout(late));
+  const found = await live.ask('verdicts', [request], { topic: 'verdicts' }).catch(ended).finally(() => clearTimeout(late));
   if (!found) return;
   fade(!!found.problem);
   if (found.problem) {
@@ -91,7 +91,7 @@ function askRest() {
     // the sigmas below are shown beside the verdicts, which come first
     await answered;
     if (!still() || isStale()) return;
-    const run = await behind.ask('call', ['simulate', { sources: named }], { lane: 'sigmas' }).catch(failed);
+    const run = await behind.ask('call', ['simulate', { sources: named }], { topic: 'sigmas' }).catch(failed);
     if (run && still()) {
       verdicts.sigmasOf = asked;
       verdicts.sigmas = verdicts.omitted = null;
@@ -110,7 +110,7 @@ function askRest() {
     }
     drawVerdicts();
     explainAgain();
-    const solved = await behind.ask('verdicts', [{ sources: named }], { lane: 'solutions' }).catch(failed);
+    const solved = await behind.ask('verdicts', [{ sources: named }], { topic: 'solutions' }).catch(failed);
     if (solved?.answer && still()) {
       const { answer, math } = solved;
       const found = new Map([...answer.quantities, ...answer.combinations].map((q) => [q.name ?? q.expression, q]));
@@ -126,7 +126,7 @@ function askRest() {
 async function without(at) {
   const scheme = copy(state.scheme);
   scheme.position.splice(at, 1);
-  const said = await behind.ask('call', ['analyze', { sources: [source(scheme)], solutions: false, omitted: false }], { lane: `sweep without ${at}` }).catch(failed);
+  const said = await behind.ask('call', ['analyze', { sources: [source(scheme)], solutions: false, omitted: false }], { topic: `sweep without ${at}` }).catch(failed);
   if (!said?.text || !verdicts.now) return null;
   const less = byName(JSON.parse(said.text)), lost = [], later = [];
   for (const q of verdicts.now.answer.quantities) {
@@ -215,7 +215,7 @@ async function sweep(axis, mine) {
   const fresh = () => mine === round && sweepKey(axis) === key;
   for (let i = 0; i < found.grid.length; i++) {
     if (found.degrees[i]) continue;
-    const said = await behind.ask('call', ['analyze', { sources: [texts[i]], solutions: false, omitted: false }], { lane: `sweep ${axis} ${i}` }).catch(() => null);
+    const said = await behind.ask('call', ['analyze', { sources: [texts[i]], solutions: false, omitted: false }], { topic: `sweep ${axis} ${i}` }).catch(() => null);
     if (!fresh()) return;
     if (!said?.text) return;
     found.degrees[i] = degreesOf(said);
@@ -225,7 +225,7 @@ async function sweep(axis, mine) {
   if (axis !== strip.axis) return;
   for (let i = 0; i < GRID.length; i++) {
     if (found.sigmas[i]) continue;
-    const said = await behind.ask('call', ['simulate', { sources: [texts[i]] }], { lane: `sweep ${axis} ${i}` }).catch(() => null);
+    const said = await behind.ask('call', ['simulate', { sources: [texts[i]] }], { topic: `sweep ${axis} ${i}` }).catch(() => null);
     if (!fresh()) return;
     if (!said?.text) return;
     found.sigmas[i] = Object.fromEntries(JSON.parse(said.text).quantities.map((q) => [q.name, [q.predicted_sigma, q.required_sigma]]));
@@ -294,7 +294,7 @@ async function sweepLatitudes(mine) {
   for (const [i, angle] of LATITUDES.entries()) {
     if (degrees[i]) continue;
     const at = source({ ...rest, latitude_deg: angle });
-    const said = await behind.ask('call', ['analyze', { sources: [at], solutions: false, omitted: false }], { lane: `sweep latitude ${i}` }).catch(() => null);
+    const said = await behind.ask('call', ['analyze', { sources: [at], solutions: false, omitted: false }], { topic: `sweep latitude ${i}` }).catch(() => null);
     if (mine !== round || key !== keyNow() || !said?.text) return;
     degrees[i] = degreesOf(said);
   }

@@ -203,7 +203,7 @@ async function judgeText() {
     faint(true);
     put($('text-old'), $('text-verdicts').children.length ? 'Judging: what follows is of the text before.' : 'Judging\u2026');
   }, LATE);
-  const found = await live.ask('verdicts', [{ sources: [{ name: writing.name, text }] }], { lane: 'text' }).catch((p) => ({ problem: p })).finally(() => clearTimeout(late));
+  const found = await live.ask('verdicts', [{ sources: [{ name: writing.name, text }] }], { topic: 'text' }).catch((p) => ({ problem: p })).finally(() => clearTimeout(late));
   if (!found || text !== $('text').value) return;
   const area = $('text'), { problem, answer, math, sentences } = found;
   area.setAttribute('aria-invalid', problem ? 'true' : 'false');

@@ -1,4 +1,4 @@
-// Workers that run the engine. A worker answers one question at a time. Only the latest question of a lane
+// Workers that run the engine. A worker answers one question at a time. Only the latest question of a topic
 // waits.
 
 const DATA = JSON.parse(document.getElementById('data').textContent);
@@ -55,22 +55,22 @@ function makeEngine() {
   }
 
   return {
-    /** Asks; resolves to null if a later question of the same lane replaces this one. */
-    ask(kind, args, { lane, going } = {}) {
+    /** Asks; resolves to null if a later question of the same topic replaces this one. */
+    ask(kind, args, { topic, going } = {}) {
       return new Promise((resolve, reject) => {
-        if (lane) {
+        if (topic) {
           for (let i = waiting.length - 1; i >= 0; i--) {
-            if (waiting[i].lane === lane) waiting.splice(i, 1)[0].resolve(null);
+            if (waiting[i].topic === topic) waiting.splice(i, 1)[0].resolve(null);
           }
         }
-        waiting.push({ kind, args, lane, going, resolve, reject });
+        waiting.push({ kind, args, topic, going, resolve, reject });
         step();
       });
     },
-    /** Drops waiting questions of lanes that begin with `lane`. */
-    forget(lane) {
+    /** Drops waiting questions of topics that begin with `topic`. */
+    forget(topic) {
       for (let i = waiting.length - 1; i >= 0; i--) {
-        if (waiting[i].lane?.startsWith(lane)) waiting.splice(i, 1)[0].resolve(null);
+        if (waiting[i].topic?.startsWith(topic)) waiting.splice(i, 1)[0].resolve(null);
       }
     },
     /** Ends the current question. */

@@ -95,7 +95,7 @@ async function compareWith(step) {
   verdicts.before = null;
   if (step === undefined) return;
   const request = { sources: [source(TOUR[step].scheme, TOUR_FILE)], solutions: false, omitted: false };
-  const found = await live.ask('verdicts', [request], { lane: 'tour' }).catch(() => null);
+  const found = await live.ask('verdicts', [request], { topic: 'tour' }).catch(() => null);
   if (!found?.answer || mine !== tourStep) return;
   verdicts.before = found;
   await answered;

@@ -39,7 +39,7 @@ async function explain(box, named, name, more = {}) {
   if (!box.children.length) box.append(element('p', { className: 'soft', textContent: `Explaining the verdict on ${name}\u2026` }));
   box.classList.add('stale');
   const request = { sources: [named], why: [name], solutions: false, ...more };
-  const said = await behind.ask('call', ['analyze', request], { lane: box.id }).catch((problem) => ({ problem }));
+  const said = await behind.ask('call', ['analyze', request], { topic: box.id }).catch((problem) => ({ problem }));
   if (!said || box.hidden || box.dataset.question !== question) return;
   box.classList.toggle('stale', box === $('text-why') && $('text').getAttribute('aria-invalid') === 'true');
   const [e] = said.explanations ?? [];
@@ -77,7 +77,7 @@ async function nextPosition() {
   box.hidden = false;
   box.replaceChildren(element('p', { className: 'soft', textContent: 'Comparing the 24 cardinal attitudes\u2026' }));
   const request = { next: 1, keep: 3, conditions_file: source(scheme) };
-  const said = await behind.ask('call', ['design', request], { lane: 'next' }).catch((problem) => ({ problem }));
+  const said = await behind.ask('call', ['design', request], { topic: 'next' }).catch((problem) => ({ problem }));
   if (!said || box.hidden || JSON.stringify(scheme) !== JSON.stringify(state.scheme)) return;
   if (said.problem) return void box.replaceChildren(element('p', { textContent: inPageWords(said.problem.message) }));
   const { found } = JSON.parse(said.text);

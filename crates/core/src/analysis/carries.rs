@@ -69,7 +69,7 @@ pub(super) fn carry_reports(
         let differs = differs.collect();
         out.push(CarryReport { carry, unknowns: other.names().len(), differs, rank_profile });
     }
-    if scheme.by_course() && scheme.positions.len() > 1 && !out.is_empty() {
+    if scheme.by_history() && scheme.positions.len() > 1 && !out.is_empty() {
         untold.push(
             "where rotations are judged by their course, psi of reset carry is compared with the other \
              carries at the first position alone"
@@ -89,7 +89,7 @@ fn with_psi_of_positions(platform: &Platform, judged: &Verdicts) -> NamedVerdict
     let (blocks, stations) = (platform.blocks(point), scheme.stations());
     let mut out = NamedVerdicts { names: Vec::new(), verdicts: Vec::new() };
     let begins = stations.iter().enumerate().filter(|(_, s)| !s.continues);
-    let begins = begins.filter(|(_, s)| s.index == 0 || !scheme.by_course());
+    let begins = begins.filter(|(_, s)| s.index == 0 || !scheme.by_history());
     for (i, station) in begins {
         let (attitude, block) = (&point.attitudes[i], &blocks[i]);
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
@@ -97,7 +97,7 @@ fn with_psi_of_positions(platform: &Platform, judged: &Verdicts) -> NamedVerdict
             for (j, &column) in block.columns.iter().enumerate() {
                 row[column] = f.dot(0, (0..3).map(|r| (attitude[r][k], block.rows[r][j])));
             }
-            let degree = judged.stairs.iter().position(|v| v.contains(&row));
+            let degree = judged.spans.iter().position(|v| v.contains(&row));
             let moved = (0..row.len()).any(|c| row[c] != 0 && judged.degrees.excited[c]);
             out.names.push(format!("psi_{axis}@{}", station.index + 1));
             out.verdicts.push(Verdict { status: Status::of(degree, moved), degree });

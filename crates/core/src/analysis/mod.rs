@@ -75,8 +75,8 @@ pub fn analyze(
     let findings = judged.findings(&mut solver);
 
     // with torquer or accelerometer errors, derivatives of Z during a turn contain its rate
-    let course = scheme.by_course();
-    let printed = AnalysisOptions { solutions: options.solutions && !course, ..options };
+    let by_history = scheme.by_history();
+    let printed = AnalysisOptions { solutions: options.solutions && !by_history, ..options };
     let mut printer =
         SolutionPrinter { solver, options: printed, stations: stations(scheme), notes: Vec::new() };
     printer.notes.extend(findings.accuracy.as_ref().err().map(ToString::to_string));
@@ -94,13 +94,13 @@ pub fn analyze(
     let omitted = options.omitted.then(|| OmittedModel::new(&platform));
     let omitted = omitted.and_then(|model| omitted_verdicts(&platform, &model, options.seed).ok());
     printer.notes.extend(slew_note(scheme));
-    let asked = (options.solutions && !course, loci_unexplained);
+    let asked = (options.solutions && !by_history, loci_unexplained);
     let missing = MissingParts {
         left_out: printer.solver.left_out(),
         formulas: options.formulas && formulas.is_none(),
         ..MissingParts::new(&quantities, &combinations, &findings, &found, asked)
     };
-    let sought = (options.solutions && !course || missing.formulas) && missing.any();
+    let sought = (options.solutions && !by_history || missing.formulas) && missing.any();
     let engine_busy = if sought { printer.note_missing(built, &missing) } else { None };
     Ok(Analysis {
         quantities,
@@ -450,7 +450,7 @@ pub fn term_notes(scheme: &Scheme) -> Vec<String> {
          not excited there",
     );
     say(
-        scheme.by_course(),
+        scheme.by_history(),
         "while the platform turns steadily, drift integrates to what errors of accelerometers and torquers \
          look like, so a rotating segment is judged by the course of Z, at almost any rate: a degree is a \
          power of time, the order of the derivative at positions, and what has accumulated in psi while \

@@ -3,9 +3,9 @@
 use obsdeg_exact::{Echelon, Field};
 
 use super::CarryReport;
-use crate::degree::ensemble::{Verdicts, degrees, judge, staircase};
+use crate::degree::ensemble::{Verdicts, degrees, filtration, judge};
+use crate::degree::filtration::Degrees;
 use crate::degree::findings::Findings;
-use crate::degree::staircase::Degrees;
 use crate::model::attitude::{cardinal, cardinal_names};
 use crate::model::platform::{Platform, RandomValues};
 use crate::model::{Position, Scheme, Unknowns};
@@ -20,7 +20,7 @@ const MOST_KNOWN: usize = 64;
 const MOST_PAIRS: usize = 12;
 
 /// Bases of `V_0, V_1, ...` in the two fields of a verdict.
-pub(super) type Stairs = [Vec<Echelon>; 2];
+pub(super) type Spans = [Vec<Echelon>; 2];
 
 /// Search for remedies of one scheme.
 struct SchemeRemedySearch<'a> {
@@ -29,7 +29,7 @@ struct SchemeRemedySearch<'a> {
     seed: u64,
     /// Unknowns that are not observable.
     open: Vec<usize>,
-    stairs: Stairs,
+    spans: Spans,
     out: Remedies,
 }
 
@@ -55,12 +55,12 @@ pub(super) fn remedies(
     if open.is_empty() {
         return Remedies::default();
     }
-    let stairs = stairs(platform, &verdicts.values);
+    let spans = spans(platform, &verdicts.values);
     let field = verdicts.values[0].roots().field;
     let none = Echelon::new(field, platform.names().len());
-    let directions = Directions::of(field, stairs[0].last().unwrap_or(&none));
+    let directions = Directions::of(field, spans[0].last().unwrap_or(&none));
     let out = Remedies::default();
-    let mut search = SchemeRemedySearch { platform, verdicts, seed: findings.seed, open, stairs, out };
+    let mut search = SchemeRemedySearch { platform, verdicts, seed: findings.seed, open, spans, out };
     search.known(&directions);
     let candidates = search.attitudes(&directions);
     search.carries(carries);
@@ -86,16 +86,16 @@ pub(super) fn with_attitudes(scheme: &Scheme, attitudes: &[&str]) -> Option<Sche
 }
 
 /// The bases of a scheme in both fields.
-pub(super) fn stairs(platform: &Platform, values: &[RandomValues; 2]) -> Stairs {
-    [0, 1].map(|i| staircase(platform, &values[i].sample(platform.scheme(), 1)).1)
+pub(super) fn spans(platform: &Platform, values: &[RandomValues; 2]) -> Spans {
+    [0, 1].map(|i| filtration(platform, &values[i].sample(platform.scheme(), 1)).1)
 }
 
 /// Degrees of all unknowns where the values of some are known; `None` where two fields do not agree.
-pub(super) fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Option<usize>>> {
-    let of = |stairs: &Vec<Echelon>| {
-        let columns = stairs.first().map_or(0, Echelon::columns);
+pub(super) fn degrees_knowing(spans: &Spans, known: &[usize]) -> Option<Vec<Option<usize>>> {
+    let of = |spans: &Vec<Echelon>| {
+        let columns = spans.first().map_or(0, Echelon::columns);
         let mut degree = vec![None; columns];
-        for (order, space) in stairs.iter().enumerate() {
+        for (order, space) in spans.iter().enumerate() {
             let mut space = space.clone();
             for &c in known {
                 let mut unit = vec![0; columns];
@@ -108,7 +108,7 @@ pub(super) fn degrees_knowing(stairs: &Stairs, known: &[usize]) -> Option<Vec<Op
         }
         degree
     };
-    let [first, second] = [of(&stairs[0]), of(&stairs[1])];
+    let [first, second] = [of(&spans[0]), of(&spans[1])];
     (first == second).then_some(first)
 }
 
@@ -171,7 +171,7 @@ impl SchemeRemedySearch<'_> {
             candidates.truncate(MOST_KNOWN);
         }
         for w in candidates {
-            if let Some(degrees) = degrees_knowing(&self.stairs, &[w]) {
+            if let Some(degrees) = degrees_knowing(&self.spans, &[w]) {
                 let names = self.platform.names();
                 self.enter(vec![self.value_of(w)], names, &degrees);
             }
@@ -234,7 +234,7 @@ impl SchemeRemedySearch<'_> {
         let platform = self.with(&[attitude])?;
         let scheme = platform.scheme();
         // with turns between positions or rates of rotations, each scheme draws its own random values
-        let own = scheme.torquers_act() || scheme.by_course();
+        let own = scheme.torquers_act() || scheme.by_history();
         let drawn;
         let values = match own {
             false => &self.verdicts.values[0],
@@ -243,11 +243,11 @@ impl SchemeRemedySearch<'_> {
                 &drawn
             }
         };
-        let (found, stairs) = staircase(&platform, &values.sample(scheme, 1));
+        let (found, spans) = filtration(&platform, &values.sample(scheme, 1));
         let names = self.platform.names();
         let place = |name: &String| platform.names().iter().position(|n| n == name);
         let places: Vec<usize> = names.iter().map(place).collect::<Option<_>>()?;
-        let information = stairs.last().filter(|_| !own).map(|space| added(directions, space, &places));
+        let information = spans.last().filter(|_| !own).map(|space| added(directions, space, &places));
         Some(AttitudeCandidate {
             attitude: attitude.into(),
             degrees: places.iter().map(|&k| found.degree[k]).collect(),
@@ -311,15 +311,15 @@ impl SchemeRemedySearch<'_> {
         let Ok(verdicts) = judge(&platform, self.seed) else { return Vec::new() };
         let name = self.name(known);
         let place = platform.names().iter().position(|n| *n == name);
-        let stairs = stairs(&platform, &verdicts.values);
-        let Some(degrees) = place.and_then(|k| degrees_knowing(&stairs, &[k])) else { return Vec::new() };
+        let spans = spans(&platform, &verdicts.values);
+        let Some(degrees) = place.and_then(|k| degrees_knowing(&spans, &[k])) else { return Vec::new() };
         let mut changes = self.attitude(&[attitude]);
         changes.push(self.value_of(known));
         self.enter(changes, platform.names(), &degrees)
     }
 
     fn judge_values(&mut self, known: [usize; 2]) -> Vec<usize> {
-        let Some(degrees) = degrees_knowing(&self.stairs, &known) else { return Vec::new() };
+        let Some(degrees) = degrees_knowing(&self.spans, &known) else { return Vec::new() };
         let names = self.platform.names();
         self.enter(known.map(|w| self.value_of(w)).into(), names, &degrees)
     }

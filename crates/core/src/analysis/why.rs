@@ -3,7 +3,7 @@
 use obsdeg_exact::{Echelon, RowSpace};
 
 use super::answer::Analysis;
-use super::remedies::{Stairs, degrees_knowing, stairs, with_attitudes};
+use super::remedies::{Spans, degrees_knowing, spans, with_attitudes};
 use super::{components, degrees_of, generic_angles};
 use crate::degree::rows::DerivativeRows;
 use crate::degree::{Degrees, PlatformRows, Verdict};
@@ -38,12 +38,12 @@ pub fn explain(
     let Some(column) = platform.names().iter().position(|n| n == name) else { return Ok(None) };
     let judged = JudgedScheme::new(&platform, seed)?;
     let degree = judged.verdicts.degrees.degree[column];
-    let stairs = stairs(&platform, &judged.verdicts.values);
+    let spans = spans(&platform, &judged.verdicts.values);
     let mut explainer = VerdictExplainer {
         platform: &platform,
         judged: &judged,
         found,
-        stairs,
+        spans,
         column,
         degree,
         seed,
@@ -73,7 +73,7 @@ struct VerdictExplainer<'a> {
     platform: &'a Platform,
     judged: &'a JudgedScheme<'a>,
     found: &'a Analysis,
-    stairs: Stairs,
+    spans: Spans,
     column: usize,
     degree: Option<usize>,
     seed: u64,
@@ -147,12 +147,12 @@ impl VerdictExplainer<'_> {
     ) -> Option<UnseenDirection> {
         let order = match self.degree {
             Some(degree) => degree.checked_sub(1)?,
-            None => self.stairs[0].len().saturating_sub(1),
+            None => self.spans[0].len().saturating_sub(1),
         };
         let space = |i: usize| {
             let none =
                 || Echelon::new(self.judged.verdicts.values[i].roots().field, self.platform.names().len());
-            self.stairs[i].get(order).cloned().unwrap_or_else(none)
+            self.spans[i].get(order).cloned().unwrap_or_else(none)
         };
         let [first, second] = [space(0), space(1)];
         let support = Directions::of(first.field(), &first).shortest(self.column)?;
@@ -290,7 +290,7 @@ impl VerdictExplainer<'_> {
         let names = self.platform.names().to_vec();
         let others = (0..unknowns).filter(|&w| w != self.column).collect::<Vec<_>>();
         let tried = others.into_iter().filter_map(|w| {
-            let after = degrees_knowing(&self.stairs, &[w])?;
+            let after = degrees_knowing(&self.spans, &[w])?;
             self.improvement(vec![Change::Known { name: names[w].clone() }], &names, &after)
         });
         tried.collect()

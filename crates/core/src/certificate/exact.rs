@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use obsdeg_exact::radical::embeddings;
 use obsdeg_exact::{Field, RootField};
 
-use super::witness::{Staircase, WitnessedVerdict};
+use super::witness::{Filtration, WitnessedVerdict};
 use super::{ExactNumber, ExactVector, Exactly, number};
 use crate::degree::coefficient::{Coefficient, Number, power, recover_radical};
 use crate::degree::ensemble::Verdicts;
@@ -43,11 +43,11 @@ pub(super) fn image(c: &Exactly, sample: &FieldSample, rates: [u64; 2]) -> Vec<(
 }
 
 /// The fields, embeddings and rates at which everything is solved.
-struct StaircasePoints<'a> {
+struct FiltrationPoints<'a> {
     platform: &'a Platform,
     fields: [RootField; 2],
-    /// Staircases at the points, indexed `[field][embedding][point]`.
-    stairs: [[Vec<SolvedStaircase>; 4]; 2],
+    /// Filtrations at the points, indexed `[field][embedding][point]`.
+    filtrations: [[Vec<SolvedFiltration>; 4]; 2],
     /// Rates `(wN, wU)` of the points. At a pole or the equator the only non-zero rate is 1.
     rates: Vec<[u64; 2]>,
     pole: bool,
@@ -55,10 +55,10 @@ struct StaircasePoints<'a> {
     lowest: i32,
 }
 
-/// Staircase at one point, with the inverses of its minors.
-struct SolvedStaircase {
+/// Filtration at one point, with the inverses of its minors.
+struct SolvedFiltration {
     sample: FieldSample,
-    staircase: Staircase,
+    filtration: Filtration,
     inverses: Vec<Vec<Vec<u64>>>,
 }
 
@@ -67,7 +67,7 @@ struct SolvedStaircase {
 pub(super) fn exact(
     platform: &Platform,
     verdicts: &Verdicts,
-    staircase: &Staircase,
+    filtration: &Filtration,
     combinations: &[Exactly],
     found: &[WitnessedVerdict],
 ) -> Option<ExactWitness> {
@@ -77,27 +77,27 @@ pub(super) fn exact(
     if !drifts || !angles.all(|a| a.is_multiple_of_deg(15)) {
         return None;
     }
-    let points = StaircasePoints::new(platform, verdicts, staircase, combinations)?;
+    let points = FiltrationPoints::new(platform, verdicts, filtration, combinations)?;
     let null_vectors =
-        (0..staircase.ranks.len()).map(|k| points.null_vectors(staircase, k)).collect::<Option<_>>()?;
+        (0..filtration.ranks.len()).map(|k| points.null_vectors(filtration, k)).collect::<Option<_>>()?;
     let one = |c: usize| vec![(c, Coefficient::one())];
     let functionals = (0..platform.names().len()).map(one).chain(combinations.iter().cloned());
     let coefficients = functionals
         .zip(found)
         .map(|(c, found)| match (found.degree, &found.solution) {
-            (Some(degree), Some(rows)) => points.coefficients(staircase, &c, degree, rows).map(Some),
+            (Some(degree), Some(rows)) => points.coefficients(filtration, &c, degree, rows).map(Some),
             _ => Some(None),
         })
         .collect::<Option<_>>()?;
     Some(ExactWitness { null_vectors, coefficients })
 }
 
-impl<'a> StaircasePoints<'a> {
-    /// Computes the staircases at all points; `None` if the basis rows differ at one of them.
+impl<'a> FiltrationPoints<'a> {
+    /// Computes the filtrations at all points; `None` if the basis rows differ at one of them.
     fn new(
         platform: &'a Platform,
         verdicts: &Verdicts,
-        staircase: &Staircase,
+        filtration: &Filtration,
         combinations: &[Exactly],
     ) -> Option<Self> {
         let latitude = platform.scheme().latitude;
@@ -113,19 +113,19 @@ impl<'a> StaircasePoints<'a> {
         let solved = |values: &crate::model::platform::RandomValues, a: u64, rates: &[u64; 2]| {
             let at = rates.map(|t| values.roots().field.from_u64(t));
             let sample = values.sample_at(platform.scheme(), a, at);
-            let other = Staircase::new(platform, &sample);
-            let same = other.basis == staircase.basis && other.ranks == staircase.ranks;
+            let other = Filtration::new(platform, &sample);
+            let same = other.basis == filtration.basis && other.ranks == filtration.ranks;
             let inverses = (0..other.ranks.len()).map(|k| other.inverse(k)).collect::<Option<_>>();
-            Some(SolvedStaircase { sample, inverses: inverses?, staircase: other }).filter(|_| same)
+            Some(SolvedFiltration { sample, inverses: inverses?, filtration: other }).filter(|_| same)
         };
-        let mut stairs = [0, 1].map(|_| [0; 4].map(|_| Vec::new()));
-        for (field, values) in stairs.iter_mut().zip(&verdicts.values) {
+        let mut filtrations = [0, 1].map(|_| [0; 4].map(|_| Vec::new()));
+        for (field, values) in filtrations.iter_mut().zip(&verdicts.values) {
             for (slot, a) in field.iter_mut().zip(embeddings(values.roots().order)) {
                 *slot = rates.iter().map(|r| solved(values, a, r)).collect::<Option<_>>()?;
             }
         }
         let fields = [0, 1].map(|i| *verdicts.values[i].roots());
-        Some(Self { platform, fields, stairs, rates, pole, lowest })
+        Some(Self { platform, fields, filtrations, rates, pole, lowest })
     }
 
     /// Weight of a column: 0 for psi, 1 for a coefficient.
@@ -140,11 +140,11 @@ impl<'a> StaircasePoints<'a> {
         small.then(|| number(&Coefficient { number: number_, rates: [a, b] }))
     }
 
-    fn null_vectors(&self, staircase: &Staircase, order: usize) -> Option<Vec<ExactVector>> {
+    fn null_vectors(&self, filtration: &Filtration, order: usize) -> Option<Vec<ExactVector>> {
         let images = self
-            .stairs
+            .filtrations
             .each_ref()
-            .map(|embeddings| embeddings.each_ref().map(|points| points[0].staircase.null_vectors(order)));
+            .map(|embeddings| embeddings.each_ref().map(|points| points[0].filtration.null_vectors(order)));
         let names = self.platform.names();
         let vector = |(i, &free): (usize, &usize)| {
             let mut out = BTreeMap::new();
@@ -161,13 +161,13 @@ impl<'a> StaircasePoints<'a> {
             }
             Some(out)
         };
-        staircase.free(order).iter().enumerate().map(vector).collect()
+        filtration.free(order).iter().enumerate().map(vector).collect()
     }
 
     /// Coefficients of the rows of a solution.
     fn coefficients(
         &self,
-        staircase: &Staircase,
+        filtration: &Filtration,
         c: &Exactly,
         degree: usize,
         rows: &[usize],
@@ -184,15 +184,15 @@ impl<'a> StaircasePoints<'a> {
             // latitude alone has no solution. A row whose coefficient vanishes only there (such as wN - wU
             // at 45 deg) is not among `rows`.
             let holds = Cell::new(true);
-            let solved = |s: &SolvedStaircase, [w_n, w_u]: &[u64; 2]| {
+            let solved = |s: &SolvedFiltration, [w_n, w_u]: &[u64; 2]| {
                 let f = s.sample.roots.field;
                 let c = image(&part, &s.sample, [f.from_u64(*w_n), f.from_u64(*w_u)]);
-                let y = s.staircase.solution(&s.inverses[degree], &c);
+                let y = s.filtration.solution(&s.inverses[degree], &c);
                 let listed = y.iter().enumerate().all(|(i, y)| *y == 0 || rows.contains(&i));
-                holds.set(holds.get() && listed && s.staircase.makes(&y, &c));
+                holds.set(holds.get() && listed && s.filtration.makes(&y, &c));
                 y
             };
-            let y = self.stairs.each_ref().map(|embeddings| {
+            let y = self.filtrations.each_ref().map(|embeddings| {
                 embeddings.each_ref().map(|points| {
                     points.iter().zip(&self.rates).map(|(s, r)| solved(s, r)).collect::<Vec<_>>()
                 })
@@ -201,7 +201,7 @@ impl<'a> StaircasePoints<'a> {
                 return None;
             }
             for (slot, &row) in out.iter_mut().zip(rows) {
-                let power = weight - staircase.basis[row].0.1 as i32;
+                let power = weight - filtration.basis[row].0.1 as i32;
                 slot.extend(self.terms(power, |field, embedding, point| y[field][embedding][point][row])?);
             }
         }

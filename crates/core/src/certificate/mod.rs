@@ -24,7 +24,7 @@ use crate::model::scheme::MAX_COMBINATIONS;
 use crate::model::{Carry, Scheme, Term, Unknowns};
 use crate::solution::Frame;
 use crate::system::ModelError;
-use witness::{Staircase, WitnessedVerdict};
+use witness::{Filtration, WitnessedVerdict};
 
 /// Name and version of the layout.
 pub const LAYOUT: &str = "obsdeg.certificate/1";
@@ -217,16 +217,16 @@ pub fn certify(scheme: &Scheme, seed: u64) -> Result<Certificate, CertificateErr
     let combinations = combinations(&platform, &judged);
     let fields = [0, 1].map(|i| {
         let sample = judged.verdicts.values[i].sample(scheme, 1);
-        let found = Staircase::new(&platform, &sample);
+        let found = Filtration::new(&platform, &sample);
         let functionals = functionals(&platform, &combinations, &sample);
         (found.found(&functionals), found)
     });
-    let [(found, staircase), (second, other)] = fields;
-    if found != second || staircase.basis != other.basis || staircase.ranks != other.ranks {
+    let [(found, filtration), (second, other)] = fields;
+    if found != second || filtration.basis != other.basis || filtration.ranks != other.ranks {
         return Err(AnalysisError::from(EnsembleError::Disagreement).into());
     }
-    let exact = exact::exact(&platform, &judged.verdicts, &staircase, &combinations, &found);
-    Ok(written(&platform, &staircase, &combinations, found, exact))
+    let exact = exact::exact(&platform, &judged.verdicts, &filtration, &combinations, &found);
+    Ok(written(&platform, &filtration, &combinations, found, exact))
 }
 
 fn not_covered(found: impl Into<String>, expected: &'static str) -> CertificateError {
@@ -292,13 +292,13 @@ fn number(c: &Coefficient) -> ExactNumber {
 fn proof(
     found: WitnessedVerdict,
     coefficients: Option<Vec<ExactNumber>>,
-    staircase: &Staircase,
+    filtration: &Filtration,
     names: &[String],
 ) -> Proof {
     Proof {
         status: found.status,
         degree: found.degree,
-        solution: found.solution.map(|rows| rows.into_iter().map(|j| staircase.basis[j].0).collect()),
+        solution: found.solution.map(|rows| rows.into_iter().map(|j| filtration.basis[j].0).collect()),
         coefficients,
         hidden_by: found.hidden_by.map(|c| names[c].clone()),
         excited_by: found.excited_by,
@@ -308,7 +308,7 @@ fn proof(
 /// Assembles the certificate in the form of the file.
 fn written(
     platform: &Platform,
-    staircase: &Staircase,
+    filtration: &Filtration,
     combinations: &[Exactly],
     found: Vec<WitnessedVerdict>,
     exact: Option<exact::ExactWitness>,
@@ -319,7 +319,7 @@ fn written(
         Some(exact) => (Some(exact.null_vectors), exact.coefficients),
         None => (None, vec![None; found.len()]),
     };
-    let mut proofs = found.into_iter().zip(coefficients).map(|(f, c)| proof(f, c, staircase, names));
+    let mut proofs = found.into_iter().zip(coefficients).map(|(f, c)| proof(f, c, filtration, names));
     let verdicts: Vec<CertifiedUnknown> = names
         .iter()
         .zip(proofs.by_ref())
@@ -333,8 +333,8 @@ fn written(
         problem: problem(platform),
         unknowns: names.to_vec(),
         kind: if exactly { Kind::Exact } else { Kind::Modular },
-        ranks: staircase.ranks.clone(),
-        basis: staircase.basis.iter().map(|&((i, k, c), pivot)| (i, k, c, names[pivot].clone())).collect(),
+        ranks: filtration.ranks.clone(),
+        basis: filtration.basis.iter().map(|&((i, k, c), pivot)| (i, k, c, names[pivot].clone())).collect(),
         null_vectors,
         verdicts,
         combinations: combinations.collect(),

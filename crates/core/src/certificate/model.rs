@@ -7,7 +7,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::witness::{Staircase, WitnessedVerdict};
+use super::witness::{Filtration, WitnessedVerdict};
 use super::{CertificateError, CertifiedUnknown, MOST_UNKNOWNS, RowName, not_covered, proof, text};
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::rows::DerivativeRows;
@@ -94,12 +94,12 @@ pub fn certify_model(model: &SystemModel, seed: u64) -> Result<ModelCertificate,
     let mut rng = SplitMix64::new(seed ^ 0x6365_7274_6966_7900);
     let [first, second] =
         fields.map(|field| witness(model, &compiled, &judgement, field, &columns, &mut rng));
-    let ((staircase, found), (other, second)) = (first?, second?);
+    let ((filtration, found), (other, second)) = (first?, second?);
     let verdict = |(found, &column): (&WitnessedVerdict, &usize)| {
         let verdict = judgement.findings.verdict(column);
         (verdict.status, verdict.degree) == (found.status, found.degree)
     };
-    let agree = found == second && staircase.basis == other.basis && staircase.ranks == other.ranks;
+    let agree = found == second && filtration.basis == other.basis && filtration.ranks == other.ranks;
     if !agree || !found.iter().zip(&columns).all(verdict) {
         return Err(AnalysisError::from(EnsembleError::Disagreement).into());
     }
@@ -107,14 +107,14 @@ pub fn certify_model(model: &SystemModel, seed: u64) -> Result<ModelCertificate,
     let verdicts = unknowns.iter().zip(found);
     let verdicts = verdicts.map(|(name, found)| CertifiedUnknown {
         unknown: name.clone(),
-        proof: proof(found, None, &staircase, &unknowns),
+        proof: proof(found, None, &filtration, &unknowns),
     });
-    let basis = staircase.basis.iter().map(|&((i, k, c), pivot)| (i, k, c, unknowns[pivot].clone()));
+    let basis = filtration.basis.iter().map(|&((i, k, c), pivot)| (i, k, c, unknowns[pivot].clone()));
     Ok(ModelCertificate {
         layout: LAYOUT.into(),
         verdicts: verdicts.collect(),
         basis: basis.collect(),
-        ranks: staircase.ranks.clone(),
+        ranks: filtration.ranks.clone(),
         unknowns,
         problem,
     })
@@ -316,7 +316,7 @@ fn witness(
     field: Field,
     columns: &[usize],
     rng: &mut SplitMix64,
-) -> Result<(Staircase, Vec<WitnessedVerdict>), CertificateError> {
+) -> Result<(Filtration, Vec<WitnessedVerdict>), CertificateError> {
     let work = Work::new(model.work_limit);
     let unsolved =
         || not_covered("no point at which it is defined, or more work than the limit", "models with rows");
@@ -339,9 +339,9 @@ fn witness(
     if work.refused().is_some() || space.rank() < columns.len() && !source.is_done() {
         return Err(unsolved());
     }
-    let staircase = Staircase::of(field, columns.len(), rows);
+    let filtration = Filtration::of(field, columns.len(), rows);
     let one = field.one();
     let units: Vec<_> = (0..columns.len()).map(|c| vec![(c, one)]).collect();
-    let found = staircase.found(&units);
-    Ok((staircase, found))
+    let found = filtration.found(&units);
+    Ok((filtration, found))
 }

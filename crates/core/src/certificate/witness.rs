@@ -11,7 +11,7 @@ use crate::model::platform::{FieldSample, LOCAL, Platform, local_dynamics, local
 const ORDERS: usize = 4;
 
 /// Basis rows, pivots and ranks of the rows in one field.
-pub(super) struct Staircase {
+pub(super) struct Filtration {
     field: Field,
     rows: Vec<(RowName, Vec<u64>)>,
     /// Basis rows, each with its pivot.
@@ -61,13 +61,13 @@ fn all_rows(platform: &Platform, sample: &FieldSample) -> Vec<(RowName, Vec<u64>
     out
 }
 
-impl Staircase {
-    /// Staircase of the rows of `platform` at `sample`, lowest order first.
+impl Filtration {
+    /// Filtration of the rows of `platform` at `sample`, lowest order first.
     pub(super) fn new(platform: &Platform, sample: &FieldSample) -> Self {
         Self::of(sample.roots.field, platform.names().len(), all_rows(platform, sample))
     }
 
-    /// Staircase of rows with the given number of columns, sorted by order; rows of the highest order must
+    /// Filtration of rows with the given number of columns, sorted by order; rows of the highest order must
     /// add nothing.
     pub(super) fn of(field: Field, columns: usize, rows: Vec<(RowName, Vec<u64>)>) -> Self {
         let mut space = Echelon::new(field, columns);

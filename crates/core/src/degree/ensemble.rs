@@ -4,10 +4,10 @@
 use obsdeg_exact::certainty::{RankClaim, error_bound};
 use obsdeg_exact::{Echelon, PrimeError, gcd};
 
-use super::courses;
+use super::filtration::{Degrees, climb};
+use super::histories;
 use super::platform_rows::PlatformRows;
 use super::reset::reset_degrees;
-use super::staircase::{Degrees, climb};
 use crate::model::platform::{FieldSample, RandomValues};
 use crate::model::{Carry, ErrorSource, Platform, Unknowns};
 
@@ -34,7 +34,7 @@ pub struct Verdicts {
     /// Degrees that both fields give.
     pub degrees: Degrees,
     /// Bases of `V_0, V_1, ...` in the first field.
-    pub stairs: Vec<Echelon>,
+    pub spans: Vec<Echelon>,
     /// Random values of the two fields.
     pub values: [RandomValues; 2],
     /// Bound on the probability that any of the verdicts is wrong.
@@ -46,9 +46,9 @@ pub struct Verdicts {
 /// # Errors
 /// [`EnsembleError`].
 pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> {
-    let (degrees, stairs, values) = agreed(platform, seed, &|sample| staircase(platform, sample))?;
+    let (degrees, spans, values) = agreed(platform, seed, &|sample| filtration(platform, sample))?;
     let claim = claim(platform, &degrees, values[0].roots().order);
-    Ok(Verdicts { error_bound: error_bound(&claim, 2), degrees, stairs, values })
+    Ok(Verdicts { error_bound: error_bound(&claim, 2), degrees, spans, values })
 }
 
 /// The degrees alone, as [`judge`] finds them.
@@ -57,7 +57,7 @@ pub fn judge(platform: &Platform, seed: u64) -> Result<Verdicts, EnsembleError> 
 /// [`EnsembleError`].
 pub(crate) fn degrees(platform: &Platform, seed: u64) -> Result<Degrees, EnsembleError> {
     let scheme = platform.scheme();
-    if scheme.carry != Carry::Reset || scheme.unknowns == Unknowns::Drift || scheme.by_course() {
+    if scheme.carry != Carry::Reset || scheme.unknowns == Unknowns::Drift || scheme.by_history() {
         return Ok(judge(platform, seed)?.degrees);
     }
     Ok(agreed(platform, seed, &|sample| (reset_degrees(platform, sample), ()))?.0)
@@ -86,15 +86,15 @@ fn agreed<T>(
 }
 
 /// The degrees and the bases of `V_0, V_1, ...` at one sample.
-pub fn staircase(platform: &Platform, sample: &FieldSample) -> (Degrees, Vec<Echelon>) {
-    if platform.scheme().by_course() {
-        return courses::staircase(platform, sample);
+pub fn filtration(platform: &Platform, sample: &FieldSample) -> (Degrees, Vec<Echelon>) {
+    if platform.scheme().by_history() {
+        return histories::filtration(platform, sample);
     }
     let mut rows = PlatformRows::new(platform, sample);
     let mut basis = Echelon::new(sample.point.ring, platform.names().len());
-    let mut stairs = Vec::new();
-    let degrees = climb(&mut rows, &mut basis, |_, v| stairs.push(v.clone()));
-    (degrees, stairs)
+    let mut spans = Vec::new();
+    let degrees = climb(&mut rows, &mut basis, |_, v| spans.push(v.clone()));
+    (degrees, spans)
 }
 
 /// Size of the claim (see [`obsdeg_exact::certainty`]). A row is a row of `H F^k`, of degree k in the rates,
@@ -109,10 +109,13 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> RankClaim {
     // entries of a row: psi of its position, and the coefficients
     let entries = 3 + platform.coefficients();
     let torquers = usize::from(scheme.unknowns.have(ErrorSource::Rate));
-    let rotations =
-        if scheme.by_course() { scheme.positions.iter().filter(|p| p.rotation.is_some()).count() } else { 0 };
+    let rotations = if scheme.by_history() {
+        scheme.positions.iter().filter(|p| p.rotation.is_some()).count()
+    } else {
+        0
+    };
     let harmonics = platform.errors().harmonics();
-    let turning_bits = rotations as f64 * courses::bits(harmonics);
+    let turning_bits = rotations as f64 * histories::bits(harmonics);
     // an entry is at most 6, denominators 2^9 (2^3 of every factor beyond two), 15 entries of norm at most
     // sqrt(15) together, with margin
     let bits = 16.0 + 3.0 * (factors - 2) as f64 + (entries as f64 / 15.0).log2().max(0.0) / 2.0;
@@ -123,7 +126,7 @@ fn claim(platform: &Platform, degrees: &Degrees, order: u64) -> RankClaim {
         row_degree: orders
             + if generic { 6 * (1 + factors) } else { 0 }
             + torquers
-            + rotations * courses::degree(harmonics),
+            + rotations * histories::degree(harmonics),
         row_bits: bits + torquer_bits(platform) + turning_bits,
     }
 }
@@ -171,7 +174,7 @@ mod tests {
 
     /// The degrees under reset carry, position by position, equal those of all positions at once.
     #[test]
-    fn degrees_alone_are_those_of_the_staircase() {
+    fn degrees_alone_are_those_of_the_filtration() {
         let angles = [["0", "0", "0"], ["90", "0", "0"], ["0", "90", "30"]];
         for carry in Carry::ALL {
             // the unknown `drift` belongs to one position

@@ -1,6 +1,6 @@
 //! Verdicts on any model: exact and typed, without texts. Every answer is a view of them.
 
-use super::staircase::Degrees;
+use super::filtration::Degrees;
 use super::status::Verdict;
 
 /// The verdicts on a model, a platform or any system.

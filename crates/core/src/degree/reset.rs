@@ -1,17 +1,17 @@
 //! Degrees of a scheme under reset carry, position by position. psi of a position occurs in its rows alone,
-//! so it is eliminated there, and the remaining rows concern the coefficients. The general staircase would
+//! so it is eliminated there, and the remaining rows concern the coefficients. The general filtration would
 //! need a matrix of all unknowns by all unknowns.
 
 use obsdeg_exact::Echelon;
 
+use super::filtration::Degrees;
 use super::platform_rows::{LocalRow, local_chain};
-use super::staircase::Degrees;
 use crate::model::platform::{FieldSample, LOCAL, Platform, PositionBlock};
 
 /// Number of psi components of one position.
 const PSI: usize = 3;
 
-/// Degrees of a scheme under reset carry: the result of [`super::staircase::climb`], at less cost.
+/// Degrees of a scheme under reset carry: the result of [`super::filtration::climb`], at less cost.
 pub(super) fn reset_degrees(platform: &Platform, sample: &FieldSample) -> Degrees {
     let field = sample.point.ring;
     let chain = local_chain(&field, sample.point.w_n, sample.point.w_u, platform.observed());
@@ -84,7 +84,7 @@ fn row(field: &obsdeg_exact::Field, local: &LocalRow, block: &PositionBlock<u64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::degree::ensemble::staircase;
+    use crate::degree::ensemble::filtration;
     use crate::model::platform::RandomValues;
     use crate::model::{Angle, Carry, ErrorSource, Rotation, Scheme, Term, Unknowns};
     use obsdeg_exact::SplitMix64;
@@ -121,7 +121,7 @@ mod tests {
             let values = RandomValues::draw(&scheme, &mut SplitMix64::new(5)).expect("a field");
             let platform = Platform::new(scheme).expect("a scheme");
             let sample = values.sample(platform.scheme(), 1);
-            prop_assert_eq!(reset_degrees(&platform, &sample), staircase(&platform, &sample).0);
+            prop_assert_eq!(reset_degrees(&platform, &sample), filtration(&platform, &sample).0);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The one interface between a model and the staircase.
+//! The one interface between a model and the filtration.
 
 use obsdeg_exact::Scalars;
 

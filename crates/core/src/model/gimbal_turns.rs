@@ -330,7 +330,7 @@ mod tests {
         /// A followed turn ends where the integrated gimbal rates (Runge-Kutta) end, and it stops at the
         /// limit that these exceed first.
         #[test]
-        fn courses_are_integrals_of_gimbal_rates(
+        fn turns_are_integrals_of_gimbal_rates(
             start in prop::array::uniform3(-80.0f64..80.0),
             axis in prop::array::uniform3(-1.0f64..1.0),
             whole in 10.0f64..180.0,

@@ -384,8 +384,8 @@ impl RandomValues {
         let mut nonzero = || 1 + rng.below(p - 1);
         let rates = (nonzero(), nonzero());
         let generic = scheme.generic_names().into_iter().map(|n| (n, nonzero())).collect();
-        let pi = (scheme.torquers_act() || scheme.by_course()).then(&mut nonzero);
-        let rotations = if scheme.by_course() { scheme.positions.len() } else { 0 };
+        let pi = (scheme.torquers_act() || scheme.by_history()).then(&mut nonzero);
+        let rotations = if scheme.by_history() { scheme.positions.len() } else { 0 };
         let turning = (0..rotations).map(|_| nonzero()).collect();
         Ok(Self { roots, rates, generic, pi, turning })
     }

@@ -82,7 +82,7 @@ pub struct Station<'a> {
     /// True if psi^n continues from the station before, whatever the carry.
     pub continues: bool,
     /// True for an end of a rotation that is judged by its output history: no derivative row is taken here.
-    pub course: bool,
+    pub by_history: bool,
 }
 
 impl Station<'_> {

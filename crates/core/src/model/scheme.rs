@@ -495,7 +495,7 @@ impl Scheme {
 
     /// True if rotations are judged by the output history during the turn, not at attitudes of the arc: if
     /// not only drifts are unknown.
-    pub fn by_course(&self) -> bool {
+    pub fn by_history(&self) -> bool {
         self.rotates() && (self.unknowns.have(ErrorSource::Rate) || self.unknowns.have(ErrorSource::Force))
     }
 
@@ -517,23 +517,23 @@ impl Scheme {
     /// stations at both ends, and no row is taken at them.
     pub fn stations(&self) -> Vec<Station<'_>> {
         let degree = 1 + self.unknowns.terms().iter().map(|t| t.order()).max().unwrap_or(0);
-        let course = self.by_course();
+        let by_history = self.by_history();
         let mut out = Vec::with_capacity(self.positions.len());
         for (index, position) in self.positions.iter().enumerate() {
             let Some(r) = &position.rotation else {
-                out.push(Station { position, index, turned: None, continues: false, course: false });
+                out.push(Station { position, index, turned: None, continues: false, by_history: false });
                 continue;
             };
             let whole = r.angle.nanodeg();
             let step = whole.clamp(-FULL_TURN, FULL_TURN) / STATION_STEPS;
-            let along = if course { 0..=0 } else { 0..=2 * degree as i64 };
+            let along = if by_history { 0..=0 } else { 0..=2 * degree as i64 };
             let angles = along.map(|k| k * step).chain([whole]);
             out.extend(angles.map(|angle| Station {
                 position,
                 index,
                 turned: Some(Turned { axis: r.axis, angle: Angle::from_nanodeg(angle) }),
                 continues: angle != 0,
-                course,
+                by_history,
             }));
         }
         out

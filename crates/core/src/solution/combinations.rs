@@ -1,4 +1,4 @@
-//! Named combinations and null vectors, from the staircase.
+//! Named combinations and null vectors, from the filtration.
 
 use obsdeg_exact::{Echelon, Radical};
 
@@ -65,7 +65,7 @@ fn lead(platform: &Platform, support: &[usize]) -> usize {
     support.iter().find(constant).copied().unwrap_or(support[0])
 }
 
-/// Basis of the staircase beyond single unknowns: for every degree k, combinations that span `V_k` together
+/// Basis of the filtration beyond single unknowns: for every degree k, combinations that span `V_k` together
 /// with the unknowns of degree up to k and the combinations before. Sparse combinations of unknowns with
 /// readable coefficients come first; combinations of `psi^n` and `eps^n` at single positions complete the
 /// basis.
@@ -86,7 +86,7 @@ pub(crate) fn combinations(
     };
     let mut out: Vec<NamedCombination> = short_vectors(verdicts).into_iter().filter_map(sum).collect();
     // other combinations that are determined during a turn contain turning rates, and have no name
-    if !platform.scheme().by_course() {
+    if !platform.scheme().by_history() {
         complete_by_positions(platform, verdicts, solver, &mut out);
     }
     out.sort_by_key(|c| c.degree);
@@ -109,7 +109,7 @@ fn single_unknowns(verdicts: &Verdicts, k: usize) -> Echelon {
 fn short_vectors(verdicts: &Verdicts) -> Vec<(Vec<u64>, usize)> {
     let field = verdicts.values[0].roots().field;
     let mut chosen: Vec<(Vec<u64>, usize)> = Vec::new();
-    for (k, basis) in verdicts.stairs.iter().enumerate() {
+    for (k, basis) in verdicts.spans.iter().enumerate() {
         let mut span = single_unknowns(verdicts, k);
         for (v, _) in &chosen {
             span.insert(v);
@@ -137,7 +137,7 @@ fn complete_by_positions(
     out: &mut Vec<NamedCombination>,
 ) {
     let labels = stations(platform.scheme());
-    for (k, basis) in verdicts.stairs.iter().enumerate() {
+    for (k, basis) in verdicts.spans.iter().enumerate() {
         let mut span = single_unknowns(verdicts, k);
         for c in out.iter().filter(|c| c.degree <= k) {
             span.insert(&c.vector);
@@ -178,7 +178,7 @@ pub(crate) fn null_space(
     verdicts: &Verdicts,
     solver: &mut Solver<'_>,
 ) -> Vec<NullVector> {
-    let Some(last) = verdicts.stairs.last() else { return Vec::new() };
+    let Some(last) = verdicts.spans.last() else { return Vec::new() };
     let field = verdicts.values[0].roots().field;
     let excited = &verdicts.degrees.excited;
     let vectors: Vec<Vec<u64>> =

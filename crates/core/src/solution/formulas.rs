@@ -49,7 +49,7 @@ pub(crate) fn formulas(platform: &Platform, solver: &mut Solver<'_>) -> Result<V
     if platform.scheme().unknowns.have(ErrorSource::Rate) {
         return Err(FormulasError::Torquers);
     }
-    if platform.scheme().by_course() {
+    if platform.scheme().by_history() {
         return Err(FormulasError::Turning);
     }
     let mut out = shared_formulas(platform, solver)?;

@@ -11,8 +11,8 @@ use serde::Serialize;
 use super::half_tangent::{Roots, coefficients, roots_deg};
 use super::local::rows_at;
 use super::solver::Solver;
-use crate::degree::ensemble::{Verdicts, staircase};
-use crate::degree::staircase::Degrees;
+use crate::degree::ensemble::{Verdicts, filtration};
+use crate::degree::filtration::Degrees;
 use crate::degree::status::{Difference, Verdict};
 use crate::language::{Environment, Expression, ExpressionError, Node, evaluate, parse};
 use crate::model::Platform;
@@ -71,7 +71,7 @@ pub(crate) enum LociError {
     OtherAngles,
     /// Minors with turning rates are not factored.
     #[error("degenerate angles of a scheme whose rotations are judged by the course of Z are not computed")]
-    Course,
+    OutputHistory,
     /// The engine's answer could not be read.
     #[error("factor `{text}`: {error}")]
     Factor {
@@ -103,8 +103,8 @@ pub(crate) fn loci(
     if names.is_empty() {
         return Ok(DegenerateLoci::default());
     }
-    if platform.scheme().by_course() {
-        return Err(LociError::Course);
+    if platform.scheme().by_history() {
+        return Err(LociError::OutputHistory);
     }
     let stations = platform.scheme().stations();
     if !stations.iter().flat_map(Station::angles).all(|a| a.turn().is_multiple_of_deg(90)) {
@@ -325,7 +325,7 @@ fn degrees_on(
         if !placed {
             continue;
         }
-        found.push(staircase(platform, &values.sample(platform.scheme(), 1)).0);
+        found.push(filtration(platform, &values.sample(platform.scheme(), 1)).0);
         if let [.., a, b] = &found[..]
             && a == b
         {

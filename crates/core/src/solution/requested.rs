@@ -34,7 +34,7 @@ pub(crate) struct Requested {
     pub row: Vec<u64>,
     /// Exact coefficients.
     pub terms: Sparse,
-    /// Verdict by the staircase.
+    /// Verdict by the filtration.
     pub verdict: Verdict,
 }
 
@@ -63,7 +63,7 @@ pub(crate) fn requested_combinations(
             let rates = [sample.point.w_n, sample.point.w_u];
             let row = row_of(&parsed, &names, &EvaluationPoint { values, sample, rates }, &mut rng)
                 .map_err(wrap)?;
-            let degree = verdicts.stairs.iter().position(|v| v.contains(&row));
+            let degree = verdicts.spans.iter().position(|v| v.contains(&row));
             let moved = (0..row.len()).any(|c| row[c] != 0 && verdicts.degrees.excited[c]);
             let status = Status::of(degree, moved);
             let terms = terms_of(&parsed, platform, &names, verdicts, &mut rng).map_err(wrap)?;

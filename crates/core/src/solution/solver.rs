@@ -90,7 +90,7 @@ impl<'a> Solver<'a> {
         let text_point = symbols.point(platform, rate(tables.zeros.w_n), rate(tables.zeros.w_u));
         // turns of torquer errors contain pi, and their drift sums of rates: neither is among the symbols
         let torquers = platform.scheme().unknowns.have(ErrorSource::Rate);
-        let others = torquers || platform.scheme().by_course();
+        let others = torquers || platform.scheme().by_history();
         let usable = worker.is_some() && symbols.angles() <= MAX_SYMBOLIC_ANGLES && !others;
         let mut text = Vec::new();
         if usable {
@@ -98,7 +98,7 @@ impl<'a> Solver<'a> {
             text.extend(motion_rows(platform, &text_point));
         }
         let floats =
-            (platform.scheme().generic_names().is_empty() && !platform.scheme().by_course()).then(|| {
+            (platform.scheme().generic_names().is_empty() && !platform.scheme().by_history()).then(|| {
                 let point = float_point(platform, &tables, FLOAT_RATES);
                 let mut rows = rows_at(platform, &point, &tables.observables);
                 rows.extend(motion_rows(platform, &point));

@@ -6,7 +6,7 @@ use obsdeg_exact::radical::embeddings;
 
 use super::local::{LocalObservable, RateZeros, local_observables, rows_at};
 use super::turning::motion_rows;
-use crate::degree::ensemble::{Verdicts, staircase};
+use crate::degree::ensemble::{Verdicts, filtration};
 use crate::model::Platform;
 use crate::model::platform::{FieldSample, RandomValues};
 
@@ -37,7 +37,7 @@ pub(crate) struct Tables {
     /// Number of rows without those of [`motion_rows`].
     pub observable_rows: usize,
     /// Orders of the rows, if these are bases of `V_0, V_1, ...`; empty otherwise.
-    stairs: Vec<usize>,
+    orders: Vec<usize>,
     /// Components of the earth rate that are zero.
     pub zeros: RateZeros,
     /// Tables `[field][embedding]`.
@@ -60,16 +60,16 @@ impl Tables {
         };
         let table = |values: &RandomValues, a: u64, [w_n, w_u]: [u64; 2]| {
             let sample = values.sample_at(scheme, a, [w_n, w_u]);
-            if scheme.by_course() {
-                let stairs = staircase(platform, &sample).1;
-                let rows = stairs.iter().flat_map(|basis| (0..basis.rank()).map(|i| basis.row(i).to_vec()));
+            if scheme.by_history() {
+                let spans = filtration(platform, &sample).1;
+                let rows = spans.iter().flat_map(|basis| (0..basis.rank()).map(|i| basis.row(i).to_vec()));
                 return RowTable { rows: rows.collect(), sample };
             }
             let mut rows = rows_at(platform, &sample.point, &observables);
             rows.extend(motion_rows(platform, &sample.point));
             RowTable { sample, rows }
         };
-        // the rates of the verdicts, so that vectors of the stairs are vectors of the first table
+        // the rates of the verdicts, so that vectors of the spans are vectors of the first table
         let tables = [0, 1].map(|i| {
             let values = &verdicts.values[i];
             let point = values.sample(scheme, 1).point;
@@ -77,14 +77,14 @@ impl Tables {
         });
         let first = &verdicts.values[0];
         let other_rates = table(first, 1, rates(first.roots()));
-        let mut stairs = Vec::new();
+        let mut orders = Vec::new();
         let mut observable_rows = scheme.stations().len() * observables.len();
-        if scheme.by_course() {
-            let ranks = verdicts.stairs.iter().map(|basis| basis.rank()).enumerate();
-            stairs = ranks.flat_map(|(order, rank)| std::iter::repeat_n(order, rank)).collect();
-            observable_rows = stairs.len();
+        if scheme.by_history() {
+            let ranks = verdicts.spans.iter().map(|basis| basis.rank()).enumerate();
+            orders = ranks.flat_map(|(order, rank)| std::iter::repeat_n(order, rank)).collect();
+            observable_rows = orders.len();
         }
-        Self { observables, observable_rows, stairs, zeros, tables, other_rates }
+        Self { observables, observable_rows, orders, zeros, tables, other_rates }
     }
 
     /// The two fields.
@@ -94,8 +94,8 @@ impl Tables {
 
     /// The derivative order of a row.
     pub(crate) fn order(&self, row: usize) -> usize {
-        let of_stairs = self.stairs.get(row).copied();
-        of_stairs.unwrap_or_else(|| self.observables[row % self.observables.len()].order)
+        let of_span = self.orders.get(row).copied();
+        of_span.unwrap_or_else(|| self.observables[row % self.observables.len()].order)
     }
 
     /// The station of a row.

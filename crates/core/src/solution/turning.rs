@@ -74,7 +74,7 @@ pub(crate) fn drift_derivative<R: Ring>(
 /// Minus `d eps_z^n/d angle` at every station as a functional of the unknowns; zero where the platform is at
 /// rest. `Z1''` is the only second derivative that solutions use (16).
 pub(crate) fn motion_rows<R: Ring>(platform: &Platform, point: &PlatformPoint<R>) -> Vec<Vec<R::Element>> {
-    if !platform.scheme().rotates() || platform.scheme().by_course() {
+    if !platform.scheme().rotates() || platform.scheme().by_history() {
         return Vec::new();
     }
     let ring = &point.ring;

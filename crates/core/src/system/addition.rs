@@ -339,7 +339,8 @@ mod tests {
                         _ => Reals::<4>.random(&mut rng, 0),
                     })
                     .collect();
-                let signals = numbers.iter().map(|&value| Signal::Constant { value, lane: None }).collect();
+                let signals =
+                    numbers.iter().map(|&value| Signal::Constant { value, component: None }).collect();
                 let starts = vec![None; numbers.len()];
                 let seed = SplitMix64::new(0);
                 let roots = compiled.outputs(0);

@@ -38,7 +38,7 @@ const SHARED: usize = 8;
 pub(super) struct Adjoint<'a, S: Values> {
     dag: &'a Dag,
     f: S,
-    lanes: usize,
+    components: usize,
     signals: Vec<Signal<S::Element>>,
     initial: Vec<Option<Initial<S::Element>>>,
     outputs: Vec<usize>,
@@ -65,7 +65,7 @@ impl<'a, S: Values> Adjoint<'a, S> {
     pub(super) fn new(
         dag: &'a Dag,
         f: S,
-        lanes: usize,
+        components: usize,
         signals: &[Signal<S::Element>],
         initial: &[Option<Initial<S::Element>>],
         outputs: &[usize],
@@ -74,14 +74,14 @@ impl<'a, S: Values> Adjoint<'a, S> {
         if signals.iter().any(|s| matches!(s, Signal::Unknown { .. })) {
             return None;
         }
-        let enough = lanes / outputs.len().max(1) + 2;
+        let enough = components / outputs.len().max(1) + 2;
         let (signals, initial, outputs) = (signals.to_vec(), initial.to_vec(), outputs.to_vec());
         let plan = RefCell::new(f.plan(1));
         let quotients = Vec::new();
         Some(Self {
             dag,
             f,
-            lanes,
+            components,
             signals,
             initial,
             outputs,
@@ -279,14 +279,16 @@ impl<'a, S: Values> Adjoint<'a, S> {
         }
         let f = &self.f;
         let row = |held: &Vec<Option<TaylorSeries<S>>>| {
-            let mut row = vec![f.zero(); self.lanes];
+            let mut row = vec![f.zero(); self.components];
             for ((w, signal), start) in held.iter().zip(&self.signals).zip(&self.initial) {
                 let Some(w) = w else { continue };
                 match signal {
-                    Signal::Constant { lane: Some(lane), .. } => row[*lane] = f.add(&row[*lane], &w[0]),
+                    Signal::Constant { component: Some(component), .. } => {
+                        row[*component] = f.add(&row[*component], &w[0])
+                    }
                     Signal::State { .. } => {
-                        for (lane, d) in start.iter().flat_map(|s| &s.1) {
-                            row[*lane] = f.add(&row[*lane], &f.mul(&w[0], d));
+                        for (component, d) in start.iter().flat_map(|s| &s.1) {
+                            row[*component] = f.add(&row[*component], &f.mul(&w[0], d));
                         }
                     }
                     _ => {}
@@ -422,8 +424,8 @@ mod tests {
             }
             for (&output, row) in compiled.outputs(0).iter().zip(adjoint.rows(order)) {
                 let mut expected = vec![0; layout.unknowns.len()];
-                for (&lane, x) in forward.lanes_of(output).iter().zip(forward.dual(output, order)) {
-                    expected[lane as usize] = Scalars::mul(&field, x, &factorial);
+                for (&component, x) in forward.components_of(output).iter().zip(forward.dual(output, order)) {
+                    expected[component as usize] = Scalars::mul(&field, x, &factorial);
                 }
                 assert_eq!(row, expected, "order {order} of {text}");
             }

@@ -193,9 +193,9 @@ impl SolutionCounting<'_> {
             && degrees.rank() == layout.unknowns.len()
         {
             let at = point.values(compiled, layout, &[]);
-            for (lane, count) in counts.iter_mut().enumerate() {
+            for (unknown, count) in counts.iter_mut().enumerate() {
                 if let Err(NotCounted::NotClosed(k)) = *count
-                    && images(&found, compiled, layout, &fields[0], &at, lane) == k
+                    && images(&found, compiled, layout, &fields[0], &at, unknown) == k
                 {
                     *count = Ok(k);
                 }
@@ -291,7 +291,7 @@ impl SolutionCounting<'_> {
     fn again(&self, counts: &mut [SolutionCount], stage: CountStage, known: [&RelationConsequences; 2]) {
         let mut new = self.agreed(&self.both(stage, known));
         let unique = known[0].unique.iter().filter(|l| known[1].unique.contains(l));
-        unique.for_each(|&lane| new[lane] = Ok(1));
+        unique.for_each(|&unknown| new[unknown] = Ok(1));
         for (count, new) in counts.iter_mut().zip(new) {
             if count.is_err() && new.is_ok() {
                 *count = new;
@@ -317,7 +317,7 @@ impl SolutionCounting<'_> {
             let stage = CountStage { whole: true, ..CountStage::new(0, limit) };
             found = self.both(stage, [&RelationConsequences::default(); 2]);
         }
-        let name = |lane: usize| self.judged.layout.unknowns[lane].name.clone();
+        let name = |unknown: usize| self.judged.layout.unknowns[unknown].name.clone();
         if pairs && let [Ok(first), Ok(second)] = &found {
             maps.extend(second_solution(self.fields, [first, second], &name));
         }
@@ -374,7 +374,7 @@ pub(super) fn values_taken(
         Role::Constant(_) | Role::KnownInput(_) | Role::Time => true,
         // a start that is given may contain parameters
         Role::State(i) if model.states[i].start == StateStart::Known => true,
-        role => judged.layout.lane(role, 0).is_some_and(|lane| counts[lane] == Some(Ok(1))),
+        role => judged.layout.index_of(role, 0).is_some_and(|unknown| counts[unknown] == Some(Ok(1))),
     };
     let single = |&node: &usize| slots_of(&compiled.dag, node).into_iter().all(is_single);
     let of_asked = compiled.combinations.iter().zip(of_asked);

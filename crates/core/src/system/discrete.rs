@@ -411,7 +411,7 @@ pub(super) fn analyze_discrete(
     // combinations are those of the first experiment, where names have no number
     let plain = |c: usize| factors.name(c, &whole, &judged.layout).trim_end_matches("@1").to_string();
     let factor = |c: usize| match factors.function(c) {
-        Some(f) => (plain(f.lane), Some(f.function)),
+        Some(f) => (plain(f.unknown), Some(f.function)),
         None => (plain(c), None),
     };
     let functions: Vec<PlacedExpression> = functions.iter().map(|terms| sum(terms, &factor)).collect();

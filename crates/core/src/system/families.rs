@@ -50,8 +50,9 @@ pub(super) fn families(
     let every_parameter: Vec<usize> = all.iter().copied().filter(is_parameter).collect();
     let parameters: Vec<usize> = moved.iter().copied().filter(is_parameter).collect();
     // a function of a scaled unknown has no weight
-    let scaled = |lane: usize| weights.iter().flatten().any(|w| w.0 == lane);
-    let functions = factors.of_functions().filter(|&c| factors.lane(c).is_some_and(|lane| !scaled(lane)));
+    let scaled = |unknown: usize| weights.iter().flatten().any(|w| w.0 == unknown);
+    let functions =
+        factors.of_functions().filter(|&c| factors.unknown(c).is_some_and(|unknown| !scaled(unknown)));
     let functions: Vec<usize> = functions.collect();
     let with_functions: Vec<usize> = all.iter().copied().chain(functions.iter().copied()).collect();
     let family = |factors: &Vec<usize>, degree, negative| {

@@ -52,7 +52,7 @@ struct Equations<'a> {
     /// Weight of every state.
     state_weights: Vec<u32>,
     /// Every unknown as a polynomial in the variables.
-    lanes: Vec<Polynomial>,
+    unknowns: Vec<Polynomial>,
     /// Polynomials that are zero.
     zero: Vec<Polynomial>,
     runs: Vec<SegmentSeries>,
@@ -78,12 +78,13 @@ impl<'a> Equations<'a> {
     ) -> Self {
         let layout = &judged.layout;
         let values = rows.values(compiled, layout, &[]);
-        let free = |lane: usize| {
-            known.unique.contains(&lane) || judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != lane))
+        let free = |unknown: usize| {
+            known.unique.contains(&unknown)
+                || judged.span.as_ref().is_none_or(|s| s.pivots().all(|p| p != unknown))
         };
-        let lane = |(lane, &value): (usize, &u64)| match free(lane) {
+        let unknown = |(unknown, &value): (usize, &u64)| match free(unknown) {
             true => Polynomial::constant(value),
-            false => Polynomial::variable(&f, lane as u32),
+            false => Polynomial::variable(&f, unknown as u32),
         };
         let state_weights = state_weights(compiled);
         let weight = |u: &Unknown| match u.role {
@@ -99,7 +100,7 @@ impl<'a> Equations<'a> {
             work,
             weights: layout.unknowns.iter().map(weight).collect(),
             state_weights,
-            lanes: values.iter().enumerate().map(lane).collect(),
+            unknowns: values.iter().enumerate().map(unknown).collect(),
             values,
             zero: known.zero.clone(),
             runs: Vec::new(),
@@ -118,8 +119,8 @@ impl<'a> Equations<'a> {
         let segments = self.compiled.segments.len().max(1);
         let mut initial = Vec::new();
         for s in 0..model.states.len() {
-            initial.push(match self.layout.lane(Role::State(s), experiment) {
-                Some(lane) => self.lanes[lane].clone(),
+            initial.push(match self.layout.index_of(Role::State(s), experiment) {
+                Some(unknown) => self.unknowns[unknown].clone(),
                 None => {
                     let node = self.compiled.node_of(Role::State(s)).ok_or(NotCounted::NoPoint)?;
                     Polynomial::constant(self.rows.coefficient(experiment * segments, node, 0))
@@ -271,8 +272,8 @@ impl<'a> Equations<'a> {
             let own = |u: &Unknown| {
                 u.role == role && u.derivative == k && u.experiment.is_none_or(|e| e == experiment)
             };
-            let lane = self.layout.unknowns.iter().position(own);
-            return lane.map_or_else(Polynomial::default, |lane| self.lanes[lane].clone());
+            let unknown = self.layout.unknowns.iter().position(own);
+            return unknown.map_or_else(Polynomial::default, |unknown| self.unknowns[unknown].clone());
         };
         if k == 0 {
             return self.runs[r].initial[s].clone();
@@ -318,7 +319,7 @@ impl<'a> Equations<'a> {
             let mut value = p.scaled(&f, f.neg(f.inv(p.coefficient(&[(v, 1)]))));
             value.add_scaled(&f, &Polynomial::variable(&f, v), f.one());
             let nodes = self.runs.iter_mut().flat_map(|r| r.nodes.iter_mut().flatten().chain(&mut r.initial));
-            for q in nodes.chain(&mut self.lanes).chain(&mut self.zero) {
+            for q in nodes.chain(&mut self.unknowns).chain(&mut self.zero) {
                 self.work.take(1 + q.len() as u64 / 4)?;
                 if q.terms_with(v) > 0 {
                     self.work.take(q.products_of_replaced(v, value.len()).saturating_mul(8))?;
@@ -479,20 +480,20 @@ pub(super) fn at_point(
 ) -> Result<Fibre, NotCounted> {
     let f = at.f;
     let verdict = work::Work::new(model.work_limit);
-    let Equations { zero, values, weights, lanes, rows, .. } =
+    let Equations { zero, values, weights, unknowns, rows, .. } =
         equations(model, compiled, judged, at, (&mut *rng, &verdict), &mut *work)?;
     let factors = Factors::new(model, compiled, &judged.layout);
-    let known = rows.values(compiled, &judged.layout, &factors.nodes(compiled)).split_off(lanes.len());
+    let known = rows.values(compiled, &judged.layout, &factors.nodes(compiled)).split_off(unknowns.len());
     let degree = &judged.findings.degrees.degree;
-    let counted = |lane: usize| degree[lane].is_some() || at.functions.is_some();
+    let counted = |unknown: usize| degree[unknown].is_some() || at.functions.is_some();
     // of inputs the derivatives, not the Taylor coefficients
-    let factor = |lane: usize| judged.layout.factorial(&f, lane);
-    let own: Vec<u64> = (0..lanes.len()).map(|lane| f.mul(values[lane], factor(lane))).collect();
-    let shown = |(lane, p): (usize, &Polynomial)| match counted(lane) {
-        true => p.scaled(&f, factor(lane)),
+    let factor = |unknown: usize| judged.layout.factorial(&f, unknown);
+    let own: Vec<u64> = (0..unknowns.len()).map(|unknown| f.mul(values[unknown], factor(unknown))).collect();
+    let shown = |(unknown, p): (usize, &Polynomial)| match counted(unknown) {
+        true => p.scaled(&f, factor(unknown)),
         false => Polynomial::default(),
     };
-    let mut wanted: Vec<Polynomial> = lanes.iter().enumerate().map(shown).collect();
+    let mut wanted: Vec<Polynomial> = unknowns.iter().enumerate().map(shown).collect();
     let zero = without_lonely(zero, values.len(), &wanted);
     // all unknowns together, by a random combination
     let mut joint = Polynomial::default();

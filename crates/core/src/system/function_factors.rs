@@ -12,7 +12,7 @@ use crate::language::Function;
 pub(super) struct UnknownFunction {
     pub(super) function: Function,
     /// Unknown that is its argument.
-    pub(super) lane: usize,
+    pub(super) unknown: usize,
     pub(super) node: usize,
     /// Node of its derivative by the argument.
     weight: usize,
@@ -44,8 +44,8 @@ impl Factors {
             let role = compiled.roles[slot];
             let is_unknown = matches!(role, Role::Parameter(_))
                 || one && matches!(role, Role::State(_) | Role::UnknownInput(_));
-            let lane = layout.lane(role, 0).filter(|_| is_unknown)?;
-            Some(UnknownFunction { function, lane, node, weight })
+            let unknown = layout.index_of(role, 0).filter(|_| is_unknown)?;
+            Some(UnknownFunction { function, unknown, node, weight })
         };
         Self {
             unknowns: layout.unknowns.len(),
@@ -83,8 +83,8 @@ impl Factors {
     }
 
     /// Unknown on which a factor depends; `None` for a known value.
-    pub(super) fn lane(&self, factor: usize) -> Option<usize> {
-        if factor < self.unknowns { Some(factor) } else { self.function(factor).map(|f| f.lane) }
+    pub(super) fn unknown(&self, factor: usize) -> Option<usize> {
+        if factor < self.unknowns { Some(factor) } else { self.function(factor).map(|f| f.unknown) }
     }
 
     /// Number of the factor with a role in an experiment; `None` if there is none.
@@ -92,7 +92,7 @@ impl Factors {
         match role {
             Role::Constant(c) => Some(self.unknowns + c),
             Role::KnownInput(i) => self.of_input(i, 0),
-            role => layout.lane(role, experiment),
+            role => layout.index_of(role, experiment),
         }
     }
 
@@ -107,7 +107,7 @@ impl Factors {
         match factor < self.unknowns {
             true => Some((factor, f.one())),
             // the derivatives follow the functions
-            false => Some((self.function(factor)?.lane, values[factor + self.functions.len()])),
+            false => Some((self.function(factor)?.unknown, values[factor + self.functions.len()])),
         }
     }
 
@@ -115,7 +115,7 @@ impl Factors {
     pub(super) fn name(&self, factor: usize, model: &SystemModel, layout: &Layout) -> String {
         if let Some(f) = self.function(factor) {
             let named = Function::ALL.iter().find(|(_, function)| *function == f.function);
-            return format!("{}({})", named.map_or("", |n| n.0), layout.unknowns[f.lane].in_formulas());
+            return format!("{}({})", named.map_or("", |n| n.0), layout.unknowns[f.unknown].in_formulas());
         }
         let constant = factor.checked_sub(self.unknowns);
         match constant.map(|c| c.checked_sub(self.constants).ok_or(c)) {

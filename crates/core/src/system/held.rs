@@ -32,11 +32,11 @@ impl<S: Values> PointBuilder<'_, '_, S> {
     }
 
     /// Changes every state and parameter so that the constraints of the motion hold; their differentials by
-    /// the `lanes` of the point. `None` without constraints, or if the motion does not keep them.
+    /// the `components` of the point. `None` without constraints, or if the motion does not keep them.
     pub(super) fn hold_kept(
         &self,
         point: &mut Point<S>,
-        lanes: usize,
+        components: usize,
         rng: &mut SplitMix64,
         attempt: usize,
     ) -> Result<Option<Rows<S>>, Singular> {
@@ -45,7 +45,7 @@ impl<S: Values> PointBuilder<'_, '_, S> {
             free[slot] |= matches!(role, Role::State(_));
         }
         self.hold(point, &self.compiled.kept, (&free, &free), (rng, attempt))?;
-        let (rows, kept) = self.constraints(point, lanes)?;
+        let (rows, kept) = self.constraints(point, components)?;
         Ok((kept && !rows.is_empty()).then_some(rows))
     }
 
@@ -139,9 +139,11 @@ impl<S: Values> PointBuilder<'_, '_, S> {
         free: &[bool],
     ) -> Result<Vec<usize>, Singular> {
         let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
-        let lane = |slot: usize| places.iter().position(|place| *place == slot);
-        let signal =
-            |(slot, value): (usize, &S::Element)| Signal::Constant { value: *value, lane: lane(slot) };
+        let component = |slot: usize| places.iter().position(|place| *place == slot);
+        let signal = |(slot, value): (usize, &S::Element)| Signal::Constant {
+            value: *value,
+            component: component(slot),
+        };
         let signals = values.iter().enumerate().map(signal).collect();
         let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
         let (dag, f) = (&self.compiled.dag, self.field.clone());
@@ -152,16 +154,21 @@ impl<S: Values> PointBuilder<'_, '_, S> {
         let mut space = S::Space::new(self.field.clone(), places.len());
         let mut out = Vec::new();
         for (c, &node) in constraints.iter().enumerate() {
-            if space.insert(&dense(&self.field, places.len(), at.lanes_of(node), at.dual(node, 0))) {
+            if space.insert(&dense(&self.field, places.len(), at.components_of(node), at.dual(node, 0))) {
                 out.push(c);
             }
         }
         Ok(out)
     }
 
-    /// Differentials of the constraints by the `lanes` of the point, and true if their first time derivatives
-    /// are zero here. The motion then keeps them, and the point is generic among those where they hold.
-    pub(super) fn constraints(&self, point: &Point<S>, lanes: usize) -> Result<(Rows<S>, bool), Singular> {
+    /// Differentials of the constraints by the `components` of the point, and true if their first time
+    /// derivatives are zero here. The motion then keeps them, and the point is generic among those where they
+    /// hold.
+    pub(super) fn constraints(
+        &self,
+        point: &Point<S>,
+        components: usize,
+    ) -> Result<(Rows<S>, bool), Singular> {
         let (compiled, f) = (self.compiled, &self.field);
         if compiled.kept.is_empty() {
             return Ok((Vec::new(), true));
@@ -169,7 +176,7 @@ impl<S: Values> PointBuilder<'_, '_, S> {
         let mut seen = Taylor::new(
             &compiled.dag,
             f.clone(),
-            lanes,
+            components,
             point.signals.clone(),
             &point.initial,
             &compiled.kept,
@@ -177,7 +184,7 @@ impl<S: Values> PointBuilder<'_, '_, S> {
             SplitMix64::new(point.seed),
             self.work,
         )?;
-        let row = |&node: &usize| dense(f, lanes, seen.lanes_of(node), seen.dual(node, 0));
+        let row = |&node: &usize| dense(f, components, seen.components_of(node), seen.dual(node, 0));
         let rows = compiled.kept.iter().map(row).collect();
         seen.advance();
         let kept = compiled.kept.iter().all(|&node| f.is_zero(&seen.value(node, 1)));

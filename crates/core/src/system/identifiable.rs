@@ -241,7 +241,7 @@ impl<'a> FunctionSearch<'a> {
                 (0..self.factors.len()).map(|c| self.factors.slope(c, &f, &at.values)).collect();
             for v in directions {
                 // m sum_c e_c v_c / x_c
-                let moved = |c: usize| slopes[c].map_or(0, |(lane, slope)| f.mul(slope, v[lane]));
+                let moved = |c: usize| slopes[c].map_or(0, |(unknown, slope)| f.mul(slope, v[unknown]));
                 let entry = |(powers, &m): (&QuotientPowers, &u64)| {
                     let along = powers.iter().fold(0, |s, &(c, e)| {
                         f.add(s, f.mul(f.from_i64(e.into()), f.mul(moved(c), inverses[c])))
@@ -328,7 +328,7 @@ impl<'a> FunctionSearch<'a> {
     /// Keeps a function if it is identifiable and independent of those before it.
     fn keep(&mut self, mut terms: Terms) {
         // known factors of all terms say nothing
-        let known = common_factor(&terms).into_iter().filter(|p| self.factors.lane(p.0).is_none());
+        let known = common_factor(&terms).into_iter().filter(|p| self.factors.unknown(p.0).is_none());
         let known: QuotientPowers = known.collect();
         terms.iter_mut().for_each(|t| t.1 = without(&t.1, &known));
         if !terms.iter().flat_map(|t| &t.1).all(|p| self.is_shown(p.0)) {
@@ -412,9 +412,9 @@ fn gradient(
     for (number, powers) in terms {
         let m = f.mul(f.from_i64(*number), product(f, powers, &at.values, &inverses));
         for &(c, e) in powers {
-            let Some((lane, slope)) = factors.slope(c, f, &at.values) else { continue };
+            let Some((unknown, slope)) = factors.slope(c, f, &at.values) else { continue };
             let along = f.mul(f.from_i64(e.into()), f.mul(m, inverses[c]));
-            out[lane] = f.add(out[lane], f.mul(slope, along));
+            out[unknown] = f.add(out[unknown], f.mul(slope, along));
         }
     }
     out

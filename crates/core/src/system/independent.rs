@@ -93,7 +93,7 @@ fn is_somewhere(
     (0..<Reals<2> as Values>::ATTEMPTS).any(|attempt| {
         let Some(values) = builder.values(rng, attempt) else { return false };
         let starts = vec![None; values.len()];
-        let signals = values.into_iter().map(|value| Signal::Constant { value, lane: None }).collect();
+        let signals = values.into_iter().map(|value| Signal::Constant { value, component: None }).collect();
         let seed = SplitMix64::new(0);
         Taylor::new(&compiled.dag, field, 0, signals, &starts, &roots, false, seed, work).is_ok()
     })
@@ -161,25 +161,34 @@ fn is_free(
     let roots: Vec<usize> = nodes.iter().map(|n| n.1).collect();
     let given =
         |s: usize| matches!(compiled.roles[s], Role::Constant(c) if compiled.constants(0)[c].is_some());
-    let lanes: Vec<usize> = (0..compiled.roles.len()).filter(|&s| !given(s)).collect();
+    let components: Vec<usize> = (0..compiled.roles.len()).filter(|&s| !given(s)).collect();
     let mut rows: Vec<Vec<u64>> = vec![Vec::new(); roots.len()];
     for _ in 0..POINTS.min(roots.len()) {
         let Some(values) = builder.values(rng, 0) else { return false };
         let signal = |(s, value): (usize, &u64)| Signal::Constant {
             value: *value,
-            lane: lanes.binary_search(&s).ok(),
+            component: components.binary_search(&s).ok(),
         };
         let signals = values.iter().enumerate().map(signal).collect();
         let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
         let dag = &compiled.dag;
-        let at =
-            Taylor::new(dag, builder.field, lanes.len(), signals, &starts, &roots, false, seed, builder.work);
+        let at = Taylor::new(
+            dag,
+            builder.field,
+            components.len(),
+            signals,
+            &starts,
+            &roots,
+            false,
+            seed,
+            builder.work,
+        );
         let Ok(at) = at else { return false };
         for (row, &node) in rows.iter_mut().zip(&roots) {
             let start = row.len();
-            row.resize(start + lanes.len(), 0);
-            for (&lane, x) in at.lanes_of(node).iter().zip(at.dual(node, 0)) {
-                row[start + lane as usize] = *x;
+            row.resize(start + components.len(), 0);
+            for (&component, x) in at.components_of(node).iter().zip(at.dual(node, 0)) {
+                row[start + component as usize] = *x;
             }
         }
         // each row against all before it

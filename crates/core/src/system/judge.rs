@@ -16,9 +16,9 @@ use super::rows::{Layout, PointBuilder, SystemRows, Unknown, random_field};
 use super::taylor::Singular;
 use super::values::Values;
 use super::work::{Spent, Work, WorkStep, product};
+use crate::degree::filtration::{Degrees, climb};
 use crate::degree::findings::{ByPrimes, Findings};
 use crate::degree::rows::DerivativeRows;
-use crate::degree::staircase::{Degrees, climb};
 use crate::degree::status::{Status, Verdict};
 use crate::language::Function;
 
@@ -195,7 +195,7 @@ impl<S: Values> PointDegrees<S> {
     }
 }
 
-/// Climbs the staircase of a system at a random point of a field. Adds the operations to `spent`, whether or
+/// Climbs the filtration of a system at a random point of a field. Adds the operations to `spent`, whether or
 /// not there is a verdict.
 pub(crate) fn climb_at<S: Values>(
     model: &SystemModel,
@@ -262,8 +262,8 @@ fn climbed<S: Values>(
         rows.coefficient(0, *node, *order);
     }
     let mut values = rows.values(compiled, layout, &nodes);
-    for (lane, _) in &scales {
-        values[*lane] = field.mul(&values[*lane], &layout.factorial(&field, *lane));
+    for (unknown, _) in &scales {
+        values[*unknown] = field.mul(&values[*unknown], &layout.factorial(&field, *unknown));
     }
     let gap = basis.gap().and(rows.gap());
     let (ended, closed) = (rows.is_done(), rows.is_generic());
@@ -273,13 +273,13 @@ fn climbed<S: Values>(
 
 /// Unknowns that are second or higher derivatives of inputs, with the inverse of `k!`.
 fn input_scales<S: Values>(layout: &Layout, f: &S) -> Vec<(usize, S::Element)> {
-    let lanes = (0..layout.unknowns.len()).filter(|&lane| layout.unknowns[lane].derivative > 1);
-    lanes.map(|lane| (lane, f.inverse(&layout.factorial(f, lane)).unwrap_or(f.zero()))).collect()
+    let unknowns = (0..layout.unknowns.len()).filter(|&unknown| layout.unknowns[unknown].derivative > 1);
+    unknowns.map(|unknown| (unknown, f.inverse(&layout.factorial(f, unknown)).unwrap_or(f.zero()))).collect()
 }
 
 /// Turns a row by Taylor coefficients of inputs into one by their derivatives.
 fn scale<S: Values>(f: &S, row: &mut [S::Element], scales: &[(usize, S::Element)]) {
-    scales.iter().for_each(|(lane, factor)| row[*lane] = f.mul(&row[*lane], factor));
+    scales.iter().for_each(|(unknown, factor)| row[*unknown] = f.mul(&row[*unknown], factor));
 }
 
 /// Rows by the derivatives of inputs in place of their Taylor coefficients.
@@ -724,7 +724,7 @@ impl Judgement {
         seed: u64,
     ) -> Self {
         let full = at.degrees.rank() == layout.unknowns.len();
-        let hidden = |lane: &usize| !is_shown(model, &layout.unknowns[*lane]);
+        let hidden = |unknown: &usize| !is_shown(model, &layout.unknowns[*unknown]);
         let hidden: Vec<usize> = (0..layout.unknowns.len()).filter(hidden).collect();
         Self {
             shown_rank: rank_without(&at.steps.field, &at.span, &hidden),

@@ -120,7 +120,7 @@ impl Motion {
                 Op::Primitive { weight, .. } => nodes[weight].as_ref(),
                 _ => None,
             };
-            let product = weight.zip(rates[own.lane].as_ref()).and_then(|(weight, rate)| {
+            let product = weight.zip(rates[own.unknown].as_ref()).and_then(|(weight, rate)| {
                 let mut product = LaurentPolynomial::new();
                 add_product(&f, &mut product, weight, rate, f.one())?;
                 Some(product)

@@ -73,7 +73,7 @@ struct SolutionPoint<'a> {
 fn sum_with(
     points: &[SolutionPoint<'_>; 2],
     known: &BTreeMap<u64, usize>,
-    lane: usize,
+    unknown: usize,
     targets: [u64; 2],
 ) -> Option<Vec<usize>> {
     let holds = |list: &[usize]| {
@@ -89,7 +89,7 @@ fn sum_with(
         return Some(vec![t]);
     }
     // the unknown itself and two more terms, or two terms
-    let own = (0..first.terms.len()).find(|&t| first.terms[t] == first.values[lane]);
+    let own = (0..first.terms.len()).find(|&t| first.terms[t] == first.values[unknown]);
     for start in [None, own] {
         if start.is_none() && own.is_none() {
             continue;
@@ -132,10 +132,10 @@ pub(super) fn second_solution(
         known.entry(x).or_insert(t);
     }
     let mut changes = Vec::new();
-    for lane in 0..n {
+    for unknown in 0..n {
         let other = |i: usize| -> Option<u64> {
-            let (f, value) = (&fields[i], fibres[i].values[lane]);
-            match fibres[i].polynomials[lane].as_deref() {
+            let (f, value) = (&fields[i], fibres[i].values[unknown]);
+            match fibres[i].polynomials[unknown].as_deref() {
                 Ok([_, _]) => Some(value),
                 // the roots of x^2 + b x + c sum to -b
                 Ok([_, b, a]) => Some(f.sub(f.neg(f.mul(*b, f.inv(*a))), value)),
@@ -143,10 +143,10 @@ pub(super) fn second_solution(
             }
         };
         let targets = [other(0)?, other(1)?];
-        if targets[0] == fibres[0].values[lane] {
+        if targets[0] == fibres[0].values[unknown] {
             continue;
         }
-        let list = sum_with(&points, &known, lane, targets)?;
+        let list = sum_with(&points, &known, unknown, targets)?;
         let mut text = String::new();
         for &t in &list {
             text.push_str(match (text.is_empty(), terms[t].negative) {
@@ -157,7 +157,7 @@ pub(super) fn second_solution(
             });
             text.push_str(&terms[t].text(name));
         }
-        changes.push(format!("{} by {text}", name(lane)));
+        changes.push(format!("{} by {text}", name(unknown)));
     }
     (!changes.is_empty()).then(|| format!("replace {}", changes.join(", ")))
 }

@@ -1,4 +1,4 @@
-//! Observable degrees of any system `x' = f(x, u, p, t)`, `z = h`, on the same staircase as the platform.
+//! Observable degrees of any system `x' = f(x, u, p, t)`, `z = h`, on the same filtration as the platform.
 //!
 //! A model is read ([`model_file`], [`json`]) and stored as a graph of shared operations (`dag`). It is
 //! evaluated as Taylor series with a dual component per unknown at a random point of a prime field

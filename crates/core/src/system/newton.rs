@@ -58,22 +58,22 @@ impl Sum {
         Self { node, terms }
     }
 
-    /// Sums of the positive and of the negative terms at a point, with their derivatives by all `lanes`.
+    /// Sums of the positive and of the negative terms at a point, with their derivatives by all `components`.
     fn sides<const N: usize>(
         &self,
         at: &Taylor<'_, Reals<N>>,
-        lanes: usize,
+        components: usize,
     ) -> ([Ball<N>; 2], [Vec<Ball<N>>; 2]) {
         let mut sides = [Ball::ZERO; 2];
-        let mut slopes = [vec![Ball::ZERO; lanes], vec![Ball::ZERO; lanes]];
+        let mut slopes = [vec![Ball::ZERO; components], vec![Ball::ZERO; components]];
         for &(minus, term) in &self.terms {
             let value = at.start(term).midpoint();
             // counted on the side on which it is positive
             let side = usize::from(minus != value.is_negative());
             sides[side] = sides[side].add(&if value.is_negative() { value.neg() } else { value });
-            for (&lane, x) in at.lanes_of(term).iter().zip(at.dual(term, 0)) {
+            for (&component, x) in at.components_of(term).iter().zip(at.dual(term, 0)) {
                 let x = if value.is_negative() { x.neg() } else { *x };
-                slopes[side][lane as usize] = slopes[side][lane as usize].add(&x);
+                slopes[side][component as usize] = slopes[side][component as usize].add(&x);
             }
         }
         (sides.map(|side| side.midpoint()), slopes)
@@ -170,7 +170,7 @@ impl Newton<'_> {
     fn series<const N: usize>(&self, values: &[Ball<N>]) -> Option<Taylor<'_, Reals<N>>> {
         let signal = |s: usize| Signal::Constant {
             value: values[s],
-            lane: self.places.iter().position(|place| *place == s),
+            component: self.places.iter().position(|place| *place == s),
         };
         let signals = (0..values.len()).map(signal).collect();
         let starts = vec![None; values.len()];

@@ -82,10 +82,10 @@ impl Quotients<'_> {
         let mut sum = Polynomial::default();
         for (number, powers) in terms {
             let mut product = Polynomial::constant(f.from_i64(*number));
-            for &(lane, exponent) in powers {
+            for &(unknown, exponent) in powers {
                 let factor = match exponent < 0 {
-                    true => self.inverse(&unknowns[lane], work)?,
-                    false => unknowns[lane].clone(),
+                    true => self.inverse(&unknowns[unknown], work)?,
+                    false => unknowns[unknown].clone(),
                 };
                 for _ in 0..exponent.unsigned_abs() {
                     product = self.product(&product, &factor, work)?;

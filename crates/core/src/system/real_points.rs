@@ -212,7 +212,7 @@ fn from_start(
 /// True if no root in a constraint would be negative at a point.
 fn are_not_negative(builder: &PointBuilder<'_, '_, Reals<4>>, values: &[Ball<4>]) -> bool {
     let compiled = builder.compiled;
-    let signals = values.iter().map(|value| Signal::Constant { value: *value, lane: None }).collect();
+    let signals = values.iter().map(|value| Signal::Constant { value: *value, component: None }).collect();
     let (starts, seed) = (vec![None; values.len()], SplitMix64::new(0));
     let nodes = &compiled.not_negative;
     let at = Taylor::new(&compiled.dag, Reals::<4>, 0, signals, &starts, nodes, false, seed, builder.work);

@@ -65,15 +65,15 @@ pub fn reduced(model: &SystemModel, seed: u64, order: Option<usize>) -> Result<R
     if rank == judged.layout.unknowns.len() {
         return Err(ReducedError::FullyObservable);
     }
-    let lanes = fixed_lanes(&judged, span);
+    let unknowns = fixed_unknowns(&judged, span);
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let functions = identifiable_functions(model, &compiled, &judged, &symmetries, seed)?.found;
     let mut listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
     listed.extend(functions.iter().map(|f| f.terms.clone()));
-    let ones = lanes.iter().map(|&l| (l, 1)).collect::<Vec<_>>();
-    let primes = lanes.iter().copied().zip([2, 3, 5, 7, 11, 13, 17, 19, 23, 29].into_iter().cycle());
+    let ones = unknowns.iter().map(|&l| (l, 1)).collect::<Vec<_>>();
+    let primes = unknowns.iter().copied().zip([2, 3, 5, 7, 11, 13, 17, 19, 23, 29].into_iter().cycle());
     for (numbers, plain) in [(ones, true), (primes.collect(), false)] {
-        let name = |lane: usize| judged.layout.unknowns[lane].name.clone();
+        let name = |unknown: usize| judged.layout.unknowns[unknown].name.clone();
         let stands_for: Vec<(String, String)> = match plain {
             true => listed.iter().filter_map(|terms| stands_for(terms, &numbers, &judged)).collect(),
             false => Vec::new(),
@@ -110,14 +110,14 @@ fn covered(model: &SystemModel) -> Result<(), ReducedError> {
 
 /// Unknowns that are independent of all functions that the outputs determine, one for each direction:
 /// parameters first.
-fn fixed_lanes(judged: &Judgement, span: &Echelon) -> Vec<usize> {
+fn fixed_unknowns(judged: &Judgement, span: &Echelon) -> Vec<usize> {
     let (f, n) = (span.field(), judged.layout.unknowns.len());
-    let is_parameter = |lane: &usize| matches!(judged.layout.unknowns[*lane].role, Role::Parameter(_));
+    let is_parameter = |unknown: &usize| matches!(judged.layout.unknowns[*unknown].role, Role::Parameter(_));
     let (mut order, states): (Vec<usize>, Vec<usize>) = (0..n).partition(is_parameter);
     order.extend(states);
     let mut space = span.clone();
-    order.retain(|&lane| {
-        let unit: Vec<u64> = (0..n).map(|i| if i == lane { f.one() } else { 0 }).collect();
+    order.retain(|&unknown| {
+        let unit: Vec<u64> = (0..n).map(|i| if i == unknown { f.one() } else { 0 }).collect();
         space.insert(&unit)
     });
     order.sort_unstable();
@@ -128,10 +128,10 @@ fn fixed_lanes(judged: &Judgement, span: &Echelon) -> Vec<usize> {
 /// factor.
 fn stands_for(terms: &Terms, fixed: &[(usize, i64)], judged: &Judgement) -> Option<(String, String)> {
     let [(1, powers)] = &terms[..] else { return None };
-    let is_fixed = |lane: usize| fixed.iter().any(|f| f.0 == lane);
+    let is_fixed = |unknown: usize| fixed.iter().any(|f| f.0 == unknown);
     let mut others = powers.iter().filter(|p| !is_fixed(p.0));
-    let &(lane, exponent) = others.next().filter(|p| p.1.abs() == 1)?;
-    let observable = judged.findings.degrees.degree[lane].is_some();
+    let &(unknown, exponent) = others.next().filter(|p| p.1.abs() == 1)?;
+    let observable = judged.findings.degrees.degree[unknown].is_some();
     if others.next().is_some() || observable {
         return None;
     }
@@ -143,7 +143,7 @@ fn stands_for(terms: &Terms, fixed: &[(usize, i64)], judged: &Judgement) -> Opti
         let at_start = matches!(u.role, Role::State(_)) && is_fixed(l);
         if at_start { format!("{}(0)", u.name) } else { u.name.clone() }
     };
-    Some((name(lane), function.text(&name)))
+    Some((name(unknown), function.text(&name)))
 }
 
 /// Text as a string of JSON, which is also one of TOML.

@@ -117,11 +117,12 @@ impl Layout {
 
     /// Ratio of an unknown to the Taylor coefficient that stands for it in rows: `k!` for the derivative k of
     /// an input, 1 for every other unknown.
-    pub(super) fn factorial<S: Scalars>(&self, f: &S, lane: usize) -> S::Element {
-        (2..=self.unknowns[lane].derivative).fold(f.one(), |x, k| f.mul(&x, &f.integer(k as i64)))
+    pub(super) fn factorial<S: Scalars>(&self, f: &S, unknown: usize) -> S::Element {
+        (2..=self.unknowns[unknown].derivative).fold(f.one(), |x, k| f.mul(&x, &f.integer(k as i64)))
     }
 
-    pub(super) fn lane(&self, role: Role, experiment: usize) -> Option<usize> {
+    /// Index of the unknown with a role in an experiment; `None` if there is none.
+    pub(super) fn index_of(&self, role: Role, experiment: usize) -> Option<usize> {
         let own = |u: &Unknown| u.role == role && u.experiment.is_none_or(|e| e == experiment);
         self.unknowns.iter().position(own)
     }
@@ -131,7 +132,7 @@ impl Layout {
 #[derive(Debug, Clone)]
 pub(crate) struct SystemRows<'a, S: Values> {
     field: S,
-    lanes: usize,
+    components: usize,
     runs: Vec<RunRows<'a, S>>,
     bound: usize,
     /// Work of the points that were tried, and of all rows so far.
@@ -281,14 +282,14 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         let mut signals = Vec::new();
         let mut initial = vec![None; self.compiled.roles.len()];
         for (slot, role) in self.compiled.roles.iter().enumerate() {
-            let lane = self.layout.lane(*role, experiment);
+            let component = self.layout.index_of(*role, experiment);
             signals.push(match *role {
                 Role::State(i) => {
-                    initial[slot] = Some((random(), lane.map(|l| (l, f.one())).into_iter().collect()));
+                    initial[slot] = Some((random(), component.map(|l| (l, f.one())).into_iter().collect()));
                     Signal::State { rate: self.compiled.rates(experiment)[i] }
                 }
-                Role::Parameter(i) => Signal::Constant { value: parameters[i], lane },
-                Role::Constant(i) => Signal::Constant { value: constants[i], lane: None },
+                Role::Parameter(i) => Signal::Constant { value: parameters[i], component },
+                Role::Constant(i) => Signal::Constant { value: constants[i], component: None },
                 Role::KnownInput(i) => Signal::Known {
                     value: random(),
                     degree: match model.known_input(experiment, i) {
@@ -298,7 +299,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
                 },
                 Role::UnknownInput(i) => Signal::Unknown {
                     value: random(),
-                    lane: lane.unwrap_or(0),
+                    component: component.unwrap_or(0),
                     count: model.unknown_inputs[i].1.unwrap_or(self.layout.bound) + 1,
                 },
                 Role::Time => Signal::Time { value: time },
@@ -368,7 +369,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
 
     fn set_constant(&self, point: &mut Point<S>, c: usize, value: S::Element) {
         if let Some(slot) = self.slot_of(Role::Constant(c)) {
-            point.signals[slot] = Signal::Constant { value, lane: None };
+            point.signals[slot] = Signal::Constant { value, component: None };
         }
     }
 
@@ -381,8 +382,8 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         let seen = self.look(point, &nodes)?;
         for &(state, node) in formulas {
             if let Some(slot) = self.slot_of(Role::State(state)) {
-                let lanes = seen.lanes_of(node).iter().map(|l| *l as usize);
-                let duals = lanes.zip(seen.dual(node, 0).iter().copied());
+                let components = seen.components_of(node).iter().map(|l| *l as usize);
+                let duals = components.zip(seen.dual(node, 0).iter().copied());
                 point.initial[slot] =
                     Some((seen.start(node), duals.filter(|(_, x)| *x != self.field.zero()).collect()));
             }
@@ -391,14 +392,14 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
     }
 
     /// Taylor series of a run.
-    fn series(&self, point: &Point<S>, lanes: usize) -> Result<Taylor<'a, S>, Singular> {
+    fn series(&self, point: &Point<S>, components: usize) -> Result<Taylor<'a, S>, Singular> {
         let compiled = self.compiled;
         let roots: Vec<usize> =
             compiled.outputs(point.experiment).iter().chain(&compiled.combinations).copied().collect();
         Taylor::new(
             &compiled.dag,
             self.field.clone(),
-            lanes,
+            components,
             point.signals.clone(),
             &point.initial,
             &roots,
@@ -409,16 +410,20 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
     }
 
     /// Rows of a run computed backwards; `None` if there are few unknowns.
-    fn adjoint(&self, point: &Point<S>, lanes: usize) -> Option<Adjoint<'a, S>> {
+    fn adjoint(&self, point: &Point<S>, components: usize) -> Option<Adjoint<'a, S>> {
         let outputs = self.compiled.outputs(point.experiment).len();
-        if lanes < MANY && lanes < LONG * outputs { None } else { self.backwards(point, lanes) }
+        if components < MANY && components < LONG * outputs {
+            None
+        } else {
+            self.backwards(point, components)
+        }
     }
 
-    fn backwards(&self, point: &Point<S>, lanes: usize) -> Option<Adjoint<'a, S>> {
+    fn backwards(&self, point: &Point<S>, components: usize) -> Option<Adjoint<'a, S>> {
         let outputs = self.compiled.outputs(point.experiment);
         let (dag, f) = (&self.compiled.dag, self.field.clone());
         let values = self.series(point, 0).ok()?;
-        Adjoint::new(dag, f, lanes, &point.signals, &point.initial, outputs, values)
+        Adjoint::new(dag, f, components, &point.signals, &point.initial, outputs, values)
     }
 
     /// A run at a random point, computed forwards and backwards.
@@ -428,9 +433,9 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         let parameters: Vec<S::Element> = self.model.parameters.iter().map(|_| f.random(rng, 0)).collect();
         let mut point = self.draw(0, (&parameters, &[]), f.zero(), rng, 0).expect("work");
         self.set_states(&mut point, &given(&self.compiled.starts)).expect("starts");
-        let lanes = self.layout.unknowns.len();
-        let forward = self.series(&point, lanes).expect("a point");
-        (forward, self.backwards(&point, lanes).expect("no unknown inputs"))
+        let components = self.layout.unknowns.len();
+        let forward = self.series(&point, components).expect("a point");
+        (forward, self.backwards(&point, components).expect("no unknown inputs"))
     }
 
     /// Random values of an experiment that satisfy the constraints. The parameters and constants of the first
@@ -494,10 +499,10 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         rng: &mut SplitMix64,
         gap: &mut RankMargin,
     ) -> Result<RunRows<'a, S>, Singular> {
-        let (compiled, f, lanes) = (self.compiled, &self.field, self.layout.unknowns.len());
+        let (compiled, f, components) = (self.compiled, &self.field, self.layout.unknowns.len());
         let point = &start.point;
-        let taylor = self.series(point, lanes)?;
-        let gradient = |&node: &usize| dense(f, lanes, taylor.lanes_of(node), taylor.dual(node, 0));
+        let taylor = self.series(point, components)?;
+        let gradient = |&node: &usize| dense(f, components, taylor.components_of(node), taylor.dual(node, 0));
         let combinations = compiled.combinations.iter().map(gradient).collect();
         let arbitrary = self.model.unknown_inputs.iter().any(|u| u.1.is_none());
         let any_time = self.model.time == StartTime::Generic;
@@ -506,7 +511,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
             () if start.generic && (number > 0 || any_time || !taylor.depends_on_time()) => {
                 EndCondition::Stagnation
             }
-            () if taylor.is_at_rest() => EndCondition::Order(lanes + self.model.states.len()),
+            () if taylor.is_at_rest() => EndCondition::Order(components + self.model.states.len()),
             () => match self.generic_ranks(point, &start.known, apart, rng) {
                 None => EndCondition::Open,
                 Some((ranks, clear)) => {
@@ -515,9 +520,9 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
                 }
             },
         };
-        let own = S::Space::new(f.clone(), lanes);
+        let own = S::Space::new(f.clone(), components);
         let outputs = compiled.outputs(point.experiment);
-        let adjoint = self.adjoint(point, lanes);
+        let adjoint = self.adjoint(point, components);
         let known = start.known.clone();
         Ok(RunRows { taylor, adjoint, outputs, own, end, done: false, known, combinations })
     }
@@ -533,7 +538,7 @@ fn cost_of<S: Values>(taylor: &Taylor<'_, S>, backwards: Option<Sweeps>, outputs
         products,
         backwards,
         outputs: outputs as u64,
-        lanes: taylor.lanes() as u64,
+        components: taylor.components() as u64,
         words: (size_of::<S::Element>() as u64).div_ceil(8),
     }
 }
@@ -552,7 +557,7 @@ fn rows_of<S: Values>(
         taylor.advance();
     }
     let row = |&output: &usize| {
-        dense(&taylor.field(), taylor.lanes(), taylor.lanes_of(output), taylor.dual(output, order))
+        dense(&taylor.field(), taylor.components(), taylor.components_of(output), taylor.dual(output, order))
     };
     outputs.iter().map(row).collect()
 }
@@ -563,10 +568,15 @@ fn given(list: &[Option<usize>]) -> Vec<(usize, usize)> {
 }
 
 /// Full row of a sparse one: zeros outside its support.
-pub(super) fn dense<S: Values>(f: &S, lanes: usize, support: &[u32], row: &[S::Element]) -> Vec<S::Element> {
-    let mut out = vec![f.zero(); lanes];
-    for (&lane, x) in support.iter().zip(row) {
-        out[lane as usize] = *x;
+pub(super) fn dense<S: Values>(
+    f: &S,
+    components: usize,
+    support: &[u32],
+    row: &[S::Element],
+) -> Vec<S::Element> {
+    let mut out = vec![f.zero(); components];
+    for (&component, x) in support.iter().zip(row) {
+        out[component as usize] = *x;
     }
     out
 }
@@ -643,7 +653,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
         attempt: usize,
     ) -> Result<Self, Singular> {
         let (model, compiled, f) = (builder.model, builder.compiled, &builder.field);
-        let lanes = builder.layout.unknowns.len();
+        let components = builder.layout.unknowns.len();
         let parameters = model.parameters.iter().map(|_| f.random(rng, attempt)).collect();
         let constants = model.constants.iter().map(|_| f.random(rng, attempt)).collect();
         let time = match model.time {
@@ -665,12 +675,12 @@ impl<'a, S: Values> SystemRows<'a, S> {
                         0 => f.zero(),
                         _ => f.random(rng, attempt),
                     });
-                    let taylor = builder.series(&other, lanes)?;
+                    let taylor = builder.series(&other, components)?;
                     runs.push(RunRows { taylor, ..runs[0].clone() });
                 }
             }
         }
-        Ok(Self { field: f.clone(), lanes, runs, bound: builder.layout.bound, work, gap })
+        Ok(Self { field: f.clone(), components, runs, bound: builder.layout.bound, work, gap })
     }
 
     /// Gradients of the combinations at the start of the first run.
@@ -767,7 +777,7 @@ impl<S: Values> DerivativeRows for SystemRows<'_, S> {
     }
 
     fn columns(&self) -> usize {
-        self.lanes
+        self.components
     }
 
     fn emit(&mut self, order: usize, sink: &mut dyn FnMut(&[S::Element]) -> bool) -> bool {

@@ -147,9 +147,9 @@ fn in_layout(
     let mut out: Vec<Option<String>> = vec![None; judged.layout.unknowns.len()];
     let roles = (0..model.states.len()).map(Role::State).chain(roles_of_parameters(model));
     for (role, text) in roles.zip(texts) {
-        let lane = judged.layout.unknowns.iter().position(|u| u.role == role);
-        if let Some(lane) = lane {
-            out[lane] = text.filter(|t| !t.is_empty() && t.len() <= KEPT);
+        let unknown = judged.layout.unknowns.iter().position(|u| u.role == role);
+        if let Some(unknown) = unknown {
+            out[unknown] = text.filter(|t| !t.is_empty() && t.len() <= KEPT);
         }
     }
     out
@@ -248,23 +248,23 @@ fn rests_on(
     symbols: &[Symbol],
     expressions: &[Option<String>],
 ) -> Vec<Option<BTreeSet<usize>>> {
-    let lane_of = |word: &str| {
+    let component_of = |word: &str| {
         // symbols of unknown states, parameters and inputs; an output may share the node of one
         let symbol = symbols.iter().find(|s| s.raw == word && word.starts_with(['x', 'p', 'w']))?;
         judged.layout.unknowns.iter().position(|u| compiled.node_of(u.role) == symbol.node)
     };
-    expressions.iter().map(|e| Some(words(e.as_ref()?).filter_map(lane_of).collect())).collect()
+    expressions.iter().map(|e| Some(words(e.as_ref()?).filter_map(component_of).collect())).collect()
 }
 
 /// Drops expressions that are no solutions: an expression contains its own unknown, directly or through the
 /// expressions of the unknowns in it.
 fn drop_circles(rests_on: &mut [Option<BTreeSet<usize>>]) {
-    for lane in 0..rests_on.len() {
-        let (mut seen, mut left) = (BTreeSet::new(), vec![lane]);
+    for unknown in 0..rests_on.len() {
+        let (mut seen, mut left) = (BTreeSet::new(), vec![unknown]);
         while let Some(at) = left.pop() {
             left.extend(rests_on[at].iter().flatten().filter(|&&on| seen.insert(on)));
         }
-        rests_on[lane].take_if(|_| seen.contains(&lane));
+        rests_on[unknown].take_if(|_| seen.contains(&unknown));
     }
 }
 
@@ -273,8 +273,8 @@ fn unique(rests_on: &[Option<BTreeSet<usize>>], single: &[bool]) -> Vec<bool> {
     let mut unique = vec![false; rests_on.len()];
     loop {
         let before = unique.clone();
-        for (lane, on) in rests_on.iter().enumerate() {
-            unique[lane] =
+        for (unknown, on) in rests_on.iter().enumerate() {
+            unique[unknown] =
                 on.as_ref().is_some_and(|on| on.iter().all(|&other| before[other] || single[other]));
         }
         if unique == before {
@@ -344,12 +344,12 @@ impl Signals {
             let start = out.add(format!("s_{i}"), shown, node, 0);
             out.starts.push((i, start));
         }
-        let lane = |role: Role| judged.layout.unknowns.iter().position(|u| u.role == role);
+        let unknown = |role: Role| judged.layout.unknowns.iter().position(|u| u.role == role);
         let roles = (0..out.states.len()).map(Role::State).chain(roles_of_parameters(model));
-        let degree = |role| lane(role).and_then(|l| judged.findings.degrees.degree[l]);
+        let degree = |role| unknown(role).and_then(|l| judged.findings.degrees.degree[l]);
         out.degrees = roles.map(degree).collect();
         let is_free = |role: Role| {
-            lane(role).is_some_and(|l| judged.span.as_ref().is_some_and(|s| s.pivots().all(|p| p != l)))
+            unknown(role).is_some_and(|l| judged.span.as_ref().is_some_and(|s| s.pivots().all(|p| p != l)))
         };
         let free = roles_of_parameters(model).enumerate().filter(|(_, role)| is_free(*role));
         out.free = free.map(|(p, _)| p).collect();

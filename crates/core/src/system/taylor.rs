@@ -1,9 +1,9 @@
 //! Taylor series of all nodes in time, coefficient by coefficient, with the derivative by every unknown (one
 //! dual component each), in any field.
 //!
-//! A node has dual components (lanes) only for unknowns that it can depend on. The weight of a function has
-//! none: for `dF = weight du` its values suffice. Orders are kept only if a later order needs them, as
-//! factors of a product of two changing nodes.
+//! A node has dual components only for unknowns that it can depend on. The weight of a function has none: for
+//! `dF = weight du` its values suffice. Orders are kept only if a later order needs them, as factors of a
+//! product of two changing nodes.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -24,12 +24,12 @@ pub(crate) enum Signal<E> {
         /// Node of the right-hand side.
         rate: usize,
     },
-    /// Number that does not change, with its lane if it is unknown.
+    /// Number that does not change, with its dual component if it is unknown.
     Constant {
         /// Value of the number.
         value: E,
-        /// Lane of the unknown; `None` if the number is known.
-        lane: Option<usize>,
+        /// Index of the unknown's dual component; `None` if the number is known.
+        component: Option<usize>,
     },
     /// Known input that starts at a value and has random derivatives up to this order (`None`: all).
     Known {
@@ -38,13 +38,13 @@ pub(crate) enum Signal<E> {
         /// Highest order of a derivative that is not zero.
         degree: Option<usize>,
     },
-    /// Unknown input: its start, the lane of its first Taylor coefficient, and the number of lanes.
+    /// Unknown input: its start, the dual component of its first Taylor coefficient, and their number.
     Unknown {
         /// Value at the start.
         value: E,
-        /// First lane.
-        lane: usize,
-        /// The number of lanes.
+        /// Index of the first dual component.
+        component: usize,
+        /// Number of dual components.
         count: usize,
     },
     /// Time of the run.
@@ -54,7 +54,7 @@ pub(crate) enum Signal<E> {
     },
 }
 
-/// Start of a state: its value and its derivative by every unknown (lane, value).
+/// Start of a state: its value and its derivative by every unknown (dual component, value).
 pub(crate) type Initial<E> = (E, Vec<(usize, E)>);
 
 /// Reasons why there is no series at a point.
@@ -95,7 +95,7 @@ impl From<ConstraintFailure> for Singular {
 pub(crate) struct Taylor<'a, S: Values> {
     dag: &'a Dag,
     f: S,
-    lanes: usize,
+    components: usize,
     signals: Vec<Signal<S::Element>>,
     rng: SplitMix64,
     /// True, per node, if it takes part in the run.
@@ -108,11 +108,11 @@ pub(crate) struct Taylor<'a, S: Values> {
     known: Vec<bool>,
     /// True, per node, if every order of its duals is needed later; otherwise two orders are kept.
     kept: Vec<bool>,
-    /// Lanes of each node, ascending.
+    /// Dual components of each node, ascending.
     support: Vec<Arc<[u32]>>,
     /// Taylor coefficients `values[node][k]`.
     values: Vec<Vec<S::Element>>,
-    /// Dual components `duals[node][k * lanes of the node + i]`, with k modulo 2 for nodes that are not
+    /// Dual components `duals[node][k * components of the node + i]`, with k modulo 2 for nodes that are not
     /// kept.
     duals: Vec<Vec<S::Element>>,
     /// Inverses of small integers.
@@ -124,7 +124,7 @@ pub(crate) struct Taylor<'a, S: Values> {
 
 impl<'a, S: Values> Taylor<'a, S> {
     /// Series at order 0 of the nodes `roots` and all nodes that they depend on. `initial` gives every
-    /// state's start (by slot). Rates take part if `moving`. Without lanes the series have values alone.
+    /// state's start (by slot). Rates take part if `moving`. Without components the series have values alone.
     ///
     /// # Errors
     /// [`Singular`] if the point has no series, or if its values and gradients exceed the limit of `work`.
@@ -132,7 +132,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     pub(crate) fn new(
         dag: &'a Dag,
         f: S,
-        lanes: usize,
+        components: usize,
         signals: Vec<Signal<S::Element>>,
         initial: &[Option<Initial<S::Element>>],
         roots: &[usize],
@@ -143,7 +143,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         let n = dag.ops.len();
         let mut out = Self {
             dag,
-            lanes,
+            components,
             signals,
             rng,
             needed: vec![false; n],
@@ -156,7 +156,7 @@ impl<'a, S: Values> Taylor<'a, S> {
             duals: vec![Vec::new(); n],
             inverses: vec![f.zero()],
             length: 0,
-            sums: vec![f.no_sum(); lanes],
+            sums: vec![f.no_sum(); components],
             f,
         };
         out.classify();
@@ -179,7 +179,7 @@ impl<'a, S: Values> Taylor<'a, S> {
                 Op::Number { .. } | Op::Pi => (true, true),
                 Op::Slot(s) => match &self.signals[s] {
                     Signal::State { .. } => (false, false),
-                    Signal::Constant { lane, .. } => (true, lane.is_none()),
+                    Signal::Constant { component, .. } => (true, component.is_none()),
                     Signal::Known { degree, .. } => (*degree == Some(0), true),
                     Signal::Unknown { count, .. } => (*count == 1, false),
                     Signal::Time { .. } => (false, true),
@@ -305,7 +305,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(self.start(node))
     }
 
-    /// Lanes of the unknowns that each node can depend on, at any order.
+    /// Dual components of the unknowns that each node can depend on, at any order.
     fn find_support(
         &mut self,
         initial: &[Option<Initial<S::Element>>],
@@ -313,17 +313,17 @@ impl<'a, S: Values> Taylor<'a, S> {
         work: &Work,
     ) -> Result<(), Singular> {
         let n = self.dag.ops.len();
-        if self.lanes == 0 {
+        if self.components == 0 {
             self.support = vec![Arc::from([]); n];
             return Ok(());
         }
-        let words = self.lanes.div_ceil(64);
+        let words = self.components.div_ceil(64);
         let (operations, bytes) = (2 * n as u64 * words as u64, 8 * n as u64 * words as u64);
-        let mut sets = self.lanes_of_slots(initial, words);
-        // add lanes of operands until nothing is added
+        let mut sets = self.components_of_slots(initial, words);
+        // add components of operands until nothing is added
         loop {
             work.take(WorkStep::Gradients, operations, bytes)?;
-            if !self.add_lanes_of_operands(&mut sets, words, moving) {
+            if !self.add_components_of_operands(&mut sets, words, moving) {
                 break;
             }
         }
@@ -332,8 +332,9 @@ impl<'a, S: Values> Taylor<'a, S> {
             .chunks(words.max(1))
             .map(|set| {
                 let list = || {
-                    let lanes = (0..self.lanes as u32).filter(|l| set[*l as usize / 64] >> (l % 64) & 1 == 1);
-                    lanes.collect()
+                    let components =
+                        (0..self.components as u32).filter(|l| set[*l as usize / 64] >> (l % 64) & 1 == 1);
+                    components.collect()
                 };
                 Arc::clone(lists.entry(set).or_insert_with(list))
             })
@@ -342,19 +343,21 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(())
     }
 
-    /// Lanes of the content of each slot, as a set of `words` words of 64 bits per node; empty for other
+    /// Components of the content of each slot, as a set of `words` words of 64 bits per node; empty for other
     /// nodes.
-    fn lanes_of_slots(&self, initial: &[Option<Initial<S::Element>>], words: usize) -> Vec<u64> {
+    fn components_of_slots(&self, initial: &[Option<Initial<S::Element>>], words: usize) -> Vec<u64> {
         let mut sets = vec![0u64; self.dag.ops.len() * words];
-        let mut own = |i: usize, lane: usize| sets[i * words + lane / 64] |= 1 << (lane % 64);
+        let mut own = |i: usize, component: usize| sets[i * words + component / 64] |= 1 << (component % 64);
         for (i, op) in self.dag.ops.iter().enumerate().filter(|(i, _)| self.needed[*i]) {
             let Op::Slot(s) = *op else { continue };
             match &self.signals[s] {
                 Signal::State { .. } => {
-                    initial[s].iter().flat_map(|x| &x.1).for_each(|(lane, _)| own(i, *lane));
+                    initial[s].iter().flat_map(|x| &x.1).for_each(|(component, _)| own(i, *component));
                 }
-                Signal::Constant { lane: Some(lane), .. } => own(i, *lane),
-                Signal::Unknown { lane, count, .. } => (*lane..lane + count).for_each(|lane| own(i, lane)),
+                Signal::Constant { component: Some(component), .. } => own(i, *component),
+                Signal::Unknown { component, count, .. } => {
+                    (*component..component + count).for_each(|component| own(i, component))
+                }
                 _ => {}
             }
         }
@@ -362,7 +365,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     }
 
     /// Adds to the set of each node those of its operands, node by node. True if any set grew.
-    fn add_lanes_of_operands(&self, sets: &mut [u64], words: usize, moving: bool) -> bool {
+    fn add_components_of_operands(&self, sets: &mut [u64], words: usize, moving: bool) -> bool {
         let mut grew = false;
         for i in (0..self.dag.ops.len()).filter(|&i| self.needed[i]) {
             let parts = match self.dag.ops[i] {
@@ -388,7 +391,7 @@ impl<'a, S: Values> Taylor<'a, S> {
     fn start_duals(&mut self, initial: &[Option<Initial<S::Element>>]) -> Result<(), Singular> {
         let f = self.f.clone();
         for i in 0..self.dag.ops.len() {
-            if self.known[i] || !self.differentiated[i] || self.lanes == 0 {
+            if self.known[i] || !self.differentiated[i] || self.components == 0 {
                 continue;
             }
             let mut sums = std::mem::take(&mut self.sums);
@@ -402,8 +405,9 @@ impl<'a, S: Values> Taylor<'a, S> {
                     Op::Number { .. } | Op::Pi => {}
                     Op::Slot(s) => match &self.signals[s] {
                         Signal::State { .. } => own.extend(initial[s].iter().flat_map(|x| &x.1).copied()),
-                        Signal::Constant { lane: Some(lane), .. } | Signal::Unknown { lane, .. } => {
-                            own.push((*lane, f.one()));
+                        Signal::Constant { component: Some(component), .. }
+                        | Signal::Unknown { component, .. } => {
+                            own.push((*component, f.one()));
                         }
                         _ => {}
                     },
@@ -433,7 +437,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         Ok(())
     }
 
-    /// Writes the sums (times a factor) as the duals of order k, adds contributions to single lanes, and
+    /// Writes the sums (times a factor) as the duals of order k, adds contributions to single components, and
     /// clears the sums.
     fn store(
         &mut self,
@@ -450,16 +454,16 @@ impl<'a, S: Values> Taylor<'a, S> {
         if row.len() < start + support.len() {
             row.resize(start + support.len(), f.zero());
         }
-        for (x, &lane) in row[start..].iter_mut().zip(support.iter()) {
-            let sum = &mut sums[lane as usize];
+        for (x, &component) in row[start..].iter_mut().zip(support.iter()) {
+            let sum = &mut sums[component as usize];
             *x = f.reduce(sum);
             if let Some(factor) = factor {
                 *x = f.mul(x, factor);
             }
             *sum = f.no_sum();
         }
-        for (lane, value) in own {
-            if let Ok(place) = support.binary_search(&(*lane as u32)) {
+        for (component, value) in own {
+            if let Ok(place) = support.binary_search(&(*component as u32)) {
                 let x = &mut row[start + place];
                 *x = f.add(x, value);
             }
@@ -479,7 +483,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.values[a].get(k).copied().unwrap_or(self.f.zero())
     }
 
-    /// Derivative of a node at order k by the unknowns of [`Taylor::lanes_of`]; empty if it is zero. Of
+    /// Derivative of a node at order k by the unknowns of [`Taylor::components_of`]; empty if it is zero. Of
     /// orders before the last, only those that are needed again are stored.
     pub(crate) fn dual(&self, a: usize, k: usize) -> &[S::Element] {
         if k > 0 && self.constant[a] {
@@ -489,8 +493,8 @@ impl<'a, S: Values> Taylor<'a, S> {
         self.duals[a].get(place * width..(place + 1) * width).unwrap_or(&[])
     }
 
-    /// Lanes of the unknowns that a node can depend on.
-    pub(crate) fn lanes_of(&self, a: usize) -> &[u32] {
+    /// Dual components of the unknowns that a node can depend on.
+    pub(crate) fn components_of(&self, a: usize) -> &[u32] {
         &self.support[a]
     }
 
@@ -500,8 +504,8 @@ impl<'a, S: Values> Taylor<'a, S> {
     }
 
     /// Number of unknowns.
-    pub(super) fn lanes(&self) -> usize {
-        self.lanes
+    pub(super) fn components(&self) -> usize {
+        self.components
     }
 
     /// True if a node takes part.
@@ -548,7 +552,7 @@ impl<'a, S: Values> Taylor<'a, S> {
         })
     }
 
-    /// Products and sums of the next order, by lanes: those independent of the order, and those for each
+    /// Products and sums of the next order, by components: those independent of the order, and those for each
     /// order before it; then the number of nodes that take part, and of products of two series among them.
     pub(super) fn operations(&self) -> [u64; 4] {
         let mut out = [0u64; 4];
@@ -586,7 +590,7 @@ impl<'a, S: Values> Taylor<'a, S> {
                 self.values[i].push(x);
             }
         }
-        for i in 0..if self.lanes == 0 { 0 } else { self.dag.ops.len() } {
+        for i in 0..if self.components == 0 { 0 } else { self.dag.ops.len() } {
             if self.differentiated[i] && !self.constant[i] && !self.known[i] {
                 interrupt::check();
                 self.next_dual(i, k);
@@ -665,7 +669,7 @@ impl<'a, S: Values> Taylor<'a, S> {
                 Signal::State { rate } => {
                     self.gather(&mut sums, &mut pending, rate, k - 1, &self.inverses[k])
                 }
-                Signal::Unknown { lane, count, .. } if k < count => own = Some((lane + k, one)),
+                Signal::Unknown { component, count, .. } if k < count => own = Some((component + k, one)),
                 _ => {}
             },
             Op::Add(a, b) => {

@@ -269,10 +269,10 @@ fn in_slot(compiled: &Compiled, layout: &Layout, u: &Unknown, slot: usize) -> Op
 
 impl Twin {
     /// Slot that replaces an unknown, its own or another, and true if the sign changes.
-    fn image(&self, compiled: &Compiled, layout: &Layout, lane: usize) -> Option<(usize, bool)> {
-        let u = &layout.unknowns[lane];
+    fn image(&self, compiled: &Compiled, layout: &Layout, unknown: usize) -> Option<(usize, bool)> {
+        let u = &layout.unknowns[unknown];
         let slot = compiled.roles.iter().position(|r| *r == u.role)?;
-        let Some(&(to, negative)) = self.images.get(&slot) else { return Some((lane, false)) };
+        let Some(&(to, negative)) = self.images.get(&slot) else { return Some((unknown, false)) };
         Some((in_slot(compiled, layout, u, to)?, negative))
     }
 
@@ -297,9 +297,9 @@ pub(super) fn images(
     layout: &Layout,
     f: &Field,
     at: &[u64],
-    lane: usize,
+    unknown: usize,
 ) -> usize {
-    let (mut seen, mut left) = (BTreeSet::from([(lane, false)]), vec![(lane, false)]);
+    let (mut seen, mut left) = (BTreeSet::from([(unknown, false)]), vec![(unknown, false)]);
     while let Some((here, negative)) = left.pop() {
         for twin in twins {
             if let Some((to, sign)) = twin.image(compiled, layout, here)
@@ -309,7 +309,8 @@ pub(super) fn images(
             }
         }
     }
-    let value = |&(lane, negative): &(usize, bool)| if negative { f.neg(at[lane]) } else { at[lane] };
+    let value =
+        |&(unknown, negative): &(usize, bool)| if negative { f.neg(at[unknown]) } else { at[unknown] };
     seen.iter().map(value).collect::<BTreeSet<u64>>().len()
 }
 

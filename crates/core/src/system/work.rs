@@ -158,7 +158,7 @@ pub(super) struct RowCost {
     /// Number of outputs.
     pub(super) outputs: u64,
     /// Number of unknowns.
-    pub(super) lanes: u64,
+    pub(super) components: u64,
     /// Number of words of 64 bits in a number.
     pub(super) words: u64,
 }
@@ -171,8 +171,8 @@ impl RowCost {
             None => self.fixed.saturating_add(self.growing.saturating_mul(next)),
             Some(sweeps) => self.swept(sweeps),
         };
-        let rank = self.outputs.saturating_mul(next).min(self.lanes);
-        let elimination = self.outputs.saturating_mul(self.lanes).saturating_mul(rank);
+        let rank = self.outputs.saturating_mul(next).min(self.components);
+        let elimination = self.outputs.saturating_mul(self.components).saturating_mul(rank);
         rows.saturating_add(elimination).saturating_mul(self.words.saturating_mul(self.words))
     }
 
@@ -201,7 +201,7 @@ impl RowCost {
             None => self.fixed.saturating_add(self.nodes).saturating_mul(order + 1),
             Some(sweeps) => self.nodes.saturating_mul(HELD).saturating_mul(sweeps.values[1]),
         };
-        let rows = self.lanes.saturating_mul(self.lanes).saturating_mul(2);
+        let rows = self.components.saturating_mul(self.components).saturating_mul(2);
         series.saturating_add(rows).saturating_mul(8 * self.words)
     }
 }
@@ -273,7 +273,16 @@ mod tests {
     use super::*;
 
     fn cost(backwards: Option<Sweeps>) -> RowCost {
-        RowCost { fixed: 10, growing: 6, nodes: 5, products: 3, backwards, outputs: 2, lanes: 7, words: 1 }
+        RowCost {
+            fixed: 10,
+            growing: 6,
+            nodes: 5,
+            products: 3,
+            backwards,
+            outputs: 2,
+            components: 7,
+            words: 1,
+        }
     }
 
     /// By hand: 10 + 6 * 4 for the rows of order 3, and 2 rows of 7 against a rank of at most 7.

@@ -82,7 +82,7 @@ impl<'a> JetSource<'a> {
     ) -> Option<Taylor<'a, Field>> {
         let (f, unknowns) = (self.f, self.layout.unknowns.len());
         let mut initial: Vec<Option<Initial<u64>>> = vec![None; self.compiled.roles.len()];
-        let mut lane = self.moving.len();
+        let mut component = self.moving.len();
         let mut signals = Vec::new();
         for (slot, role) in self.compiled.roles.iter().enumerate() {
             let place = self.layout.unknowns.iter().position(|u| u.role == *role);
@@ -96,8 +96,10 @@ impl<'a> JetSource<'a> {
                     initial[slot] = Some((start, own.filter(|_| orders.is_some()).into_iter().collect()));
                     Signal::State { rate: self.compiled.rates(0)[i] }
                 }
-                Role::State(_) | Role::Parameter(_) => Signal::Constant { value: values[place?], lane: None },
-                Role::Constant(i) => Signal::Constant { value: values[unknowns + i], lane: None },
+                Role::State(_) | Role::Parameter(_) => {
+                    Signal::Constant { value: values[place?], component: None }
+                }
+                Role::Constant(i) => Signal::Constant { value: values[unknowns + i], component: None },
                 Role::KnownInput(i) => {
                     let degree = match self.model.known_input(0, i) {
                         KnownInput::Polynomial(d) => Some(*d),
@@ -108,8 +110,8 @@ impl<'a> JetSource<'a> {
                         None => Signal::Known { value, degree },
                         Some(orders) => {
                             let count = degree.map_or(orders, |d| orders.min(d + 1));
-                            lane += orders;
-                            Signal::Unknown { value, lane: lane - orders, count }
+                            component += orders;
+                            Signal::Unknown { value, component: component - orders, count }
                         }
                     }
                 }
@@ -118,11 +120,11 @@ impl<'a> JetSource<'a> {
                 Role::UnknownInput(_) => return None,
             });
         }
-        let lanes = orders.map_or(0, |_| lane);
+        let components = orders.map_or(0, |_| component);
         let seed = SplitMix64::new(rng.next_u64());
         let outputs = self.compiled.outputs(0);
         let work = work::Work::new(self.model.work_limit);
-        Taylor::new(&self.compiled.dag, f, lanes, signals, &initial, outputs, true, seed, &work).ok()
+        Taylor::new(&self.compiled.dag, f, components, signals, &initial, outputs, true, seed, &work).ok()
     }
 
     /// True if the model has known inputs.
@@ -203,7 +205,7 @@ impl<'a> JetSource<'a> {
         let orders = n + BEYOND + 2;
         let mut series = self.series(values, Some(orders), Start::Random, rng)?;
         let outputs = self.compiled.outputs(0);
-        let lane_of_input: Vec<usize> = (self.compiled.roles.iter())
+        let component_of_input: Vec<usize> = (self.compiled.roles.iter())
             .filter_map(|r| if let Role::KnownInput(i) = *r { Some(i) } else { None })
             .collect();
         let mut space = Echelon::new(f, n);
@@ -219,14 +221,14 @@ impl<'a> JetSource<'a> {
                 series.advance();
             }
             for (j, &node) in outputs.iter().enumerate() {
-                let mut row = vec![0; n + lane_of_input.len() * orders];
-                for (&lane, &x) in series.lanes_of(node).iter().zip(series.dual(node, order)) {
-                    row[lane as usize] = x;
+                let mut row = vec![0; n + component_of_input.len() * orders];
+                for (&component, &x) in series.components_of(node).iter().zip(series.dual(node, order)) {
+                    row[component as usize] = x;
                 }
                 let used = (n..row.len()).filter(|&l| row[l] != 0).map(|l| Jet {
                     order: (l - n) % orders,
                     is_output: false,
-                    index: lane_of_input[(l - n) / orders],
+                    index: component_of_input[(l - n) / orders],
                 });
                 out.inputs[j].push(used.collect());
                 if order == 0 {

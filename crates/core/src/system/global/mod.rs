@@ -84,7 +84,7 @@ pub(super) fn known(
 ) -> RelationConsequences {
     let source = JetSource::new(model, compiled, &judged.layout, f);
     let Some(span) = &judged.span else { return RelationConsequences::default() };
-    let is_observable = |lane: &usize| judged.findings.degrees.degree[*lane].is_some();
+    let is_observable = |unknown: &usize| judged.findings.degrees.degree[*unknown].is_some();
     let ModelRelations { of_all, along } = found;
     let mut out = RelationConsequences::default();
     let (relations, several) = of_all.get_or_insert_with(|| {
@@ -92,10 +92,10 @@ pub(super) fn known(
         structure.map_or_else(Default::default, |s| relations(&source, &s, at, rng, work))
     });
     let mut narrow =
-        |lanes: &[usize], relations: &[Relation], work: &mut RemainingWork, rng: &mut SplitMix64| {
-            let lanes: Vec<usize> =
-                lanes.iter().copied().filter(|l| !single.contains(l) && !out.unique.contains(l)).collect();
-            let (open, added) = open_constants(span, &lanes);
+        |unknowns: &[usize], relations: &[Relation], work: &mut RemainingWork, rng: &mut SplitMix64| {
+            let unknowns: Vec<usize> =
+                unknowns.iter().copied().filter(|l| !single.contains(l) && !out.unique.contains(l)).collect();
+            let (open, added) = open_constants(span, &unknowns);
             let mut fibre =
                 ConstantFibre { f, at: at.to_vec(), variables: open.clone(), open, equations: Vec::new() };
             // results found before the work ended are valid

@@ -50,8 +50,8 @@ fn on_line(
     let mut out: Vec<Vec<u64>> = first.into_iter().cloned().collect();
     for s in out.len()..number {
         let mut here = at.to_vec();
-        for &(lane, speed) in direction {
-            here[lane] = f.add(here[lane], f.mul(speed, f.from_u64(s as u64)));
+        for &(unknown, speed) in direction {
+            here[unknown] = f.add(here[unknown], f.mul(speed, f.from_u64(s as u64)));
         }
         out.push(relation.coefficients(source, &here, rng, work)?.ok_or(OverLimit)?);
     }

@@ -53,7 +53,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
 
     /// All rows of every output, run by run; `None` if `work` refused them.
     pub(in crate::system) fn by_run(mut self) -> Option<Vec<PointRows<S>>> {
-        let (field, columns) = (self.field.clone(), self.lanes);
+        let (field, columns) = (self.field.clone(), self.components);
         let mut out = Vec::with_capacity(self.runs.len());
         for run in 0..self.runs.len() {
             let mut all = S::Space::new(field.clone(), columns);
@@ -72,7 +72,7 @@ impl<'a, S: Values> SystemRows<'a, S> {
     fn follow(&mut self, run: usize, outputs: &mut [OwnRows<S>], ended: &mut bool) -> Option<Vec<S::Space>> {
         let (work, bound) = (self.work, self.bound);
         let run = &mut self.runs[run];
-        let mut spaces = vec![S::Space::new(self.field.clone(), self.lanes); outputs.len()];
+        let mut spaces = vec![S::Space::new(self.field.clone(), self.components); outputs.len()];
         spaces.iter_mut().for_each(|space| run.known.iter().for_each(|row| _ = space.insert(row)));
         let mut done = vec![false; outputs.len()];
         for order in 0..=bound {

@@ -18,9 +18,9 @@ struct GenericSpans<S: Values> {
 }
 
 impl<S: Values> GenericSpans<S> {
-    fn new(field: &S, unknowns: usize, lanes: usize, groups: usize) -> Self {
+    fn new(field: &S, unknowns: usize, components: usize, groups: usize) -> Self {
         Self {
-            whole: vec![S::Space::new(field.clone(), lanes); groups],
+            whole: vec![S::Space::new(field.clone(), components); groups],
             seen: vec![S::Space::new(field.clone(), unknowns); groups],
         }
     }
@@ -54,20 +54,21 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         let groups = if apart { self.compiled.outputs(point.experiment).len() } else { 1 };
         let states: Vec<usize> =
             (0..self.model.states.len()).filter_map(|i| self.slot_of(Role::State(i))).collect();
-        let lanes = unknowns + states.len();
+        let components = unknowns + states.len();
         for attempt in 0..S::ATTEMPTS {
             let drawn = self.generic_point(point, &states, rng, attempt);
-            let found = self.on_constraints(point, drawn, lanes, rng, attempt).and_then(|(generic, rows)| {
-                let taylor = self.series(&generic, lanes)?;
-                Ok((taylor, generic, rows))
-            });
+            let found =
+                self.on_constraints(point, drawn, components, rng, attempt).and_then(|(generic, rows)| {
+                    let taylor = self.series(&generic, components)?;
+                    Ok((taylor, generic, rows))
+                });
             let (taylor, generic, kept) = match found {
                 Ok(found) => found,
                 Err(Singular::Refused) => return None,
                 Err(_) => continue,
             };
-            let adjoint = self.adjoint(&generic, lanes);
-            let mut spans = GenericSpans::new(&self.field, unknowns, lanes, groups);
+            let adjoint = self.adjoint(&generic, components);
+            let mut spans = GenericSpans::new(&self.field, unknowns, components, groups);
             for row in &kept {
                 spans.whole.iter_mut().for_each(|space| _ = space.insert(row));
                 let row = self.through_states(row, point, &states);
@@ -90,7 +91,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         &self,
         start: &Point<S>,
         drawn: Point<S>,
-        lanes: usize,
+        components: usize,
         rng: &mut SplitMix64,
         attempt: usize,
     ) -> Result<(Point<S>, Rows<S>), Singular> {
@@ -108,10 +109,10 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
                     state.0 = own.0;
                 }
             }
-            let (rows, kept) = self.constraints(&held, lanes)?;
+            let (rows, kept) = self.constraints(&held, components)?;
             kept.then_some(rows)
         } else if self.compiled.kept_is_graph {
-            self.hold_kept(&mut held, lanes, rng, attempt)?
+            self.hold_kept(&mut held, components, rng, attempt)?
         } else {
             None
         };
@@ -142,7 +143,7 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
                 Signal::Time { value } | Signal::Known { value, .. } | Signal::Unknown { value, .. } => {
                     *value = f.random(rng, attempt);
                 }
-                Signal::Constant { value, lane: Some(_) } => *value = f.random(rng, attempt),
+                Signal::Constant { value, component: Some(_) } => *value = f.random(rng, attempt),
                 _ => {}
             }
         }
@@ -188,8 +189,8 @@ impl<'a, S: Values> PointBuilder<'a, '_, S> {
         let (f, unknowns) = (&self.field, self.layout.unknowns.len());
         let mut through = row[..unknowns].to_vec();
         for (x, &slot) in row[unknowns..].iter().zip(states) {
-            for (lane, d) in point.initial[slot].iter().flat_map(|s| &s.1) {
-                through[*lane] = f.add(&through[*lane], &f.mul(x, d));
+            for (component, d) in point.initial[slot].iter().flat_map(|s| &s.1) {
+                through[*component] = f.add(&through[*component], &f.mul(x, d));
             }
         }
         through

@@ -21,8 +21,8 @@
 use obsdeg_exact::series::{SeriesEchelon, SeriesRing};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
+use super::filtration::Degrees;
 use super::platform_rows::local_chain;
-use super::staircase::Degrees;
 use super::transition::{LiftField, RandomTime, transition};
 use crate::model::Carry;
 use crate::model::attitude::{Matrix3, elementary, product, transpose, unit};
@@ -55,7 +55,7 @@ pub(super) fn bits(harmonics: usize) -> f64 {
 }
 
 /// The degrees, and the bases of `V_0, V_1, ...`, at one sample.
-pub(super) fn staircase(platform: &Platform, sample: &FieldSample) -> (Degrees, Vec<Echelon>) {
+pub(super) fn filtration(platform: &Platform, sample: &FieldSample) -> (Degrees, Vec<Echelon>) {
     let field = sample.point.ring;
     let n = platform.names().len();
     let full = at_a_time(platform, sample);
@@ -72,7 +72,7 @@ pub(super) fn staircase(platform: &Platform, sample: &FieldSample) -> (Degrees, 
     };
     let last = series.largest_valuation();
     let mut degrees = Degrees { degree: vec![None; n], ..Degrees::default() };
-    let mut stairs = Vec::new();
+    let mut spans = Vec::new();
     for order in 0..=last {
         let mut basis = Echelon::new(field, n);
         for row in series.constants_of_order(order) {
@@ -91,13 +91,13 @@ pub(super) fn staircase(platform: &Platform, sample: &FieldSample) -> (Degrees, 
         }
         degrees.rank_profile.push(basis.rank());
         let complete = basis.rank() == full.rank();
-        stairs.push(basis);
+        spans.push(basis);
         if complete {
             break;
         }
     }
     degrees.excited = (0..n).map(|c| !full.is_zero_column(c)).collect();
-    (degrees, stairs)
+    (degrees, spans)
 }
 
 /// Motion of psi in a rotation: `exp(F t)` over all of it, its integral over time in units of T, and

@@ -1,10 +1,10 @@
-//! The staircase `V_0 < V_1 < ...` of spans of derivative rows.
+//! The filtration `V_0 < V_1 < ...` of spans of derivative rows.
 
 use obsdeg_exact::{Echelon, RowSpace, Scalars};
 
 use super::rows::DerivativeRows;
 
-/// Ranks, degrees and excitation of all unknowns, from the staircase.
+/// Ranks, degrees and excitation of all unknowns, from the filtration.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Degrees {
     /// `dim V_0, dim V_1, ...` up to the last order at which some segment still had rows.
@@ -22,7 +22,7 @@ impl Degrees {
     }
 }
 
-/// Climbs the staircase: rows of order 0, 1, 2, ... enter `basis` (cleared first) until the chain of every
+/// Climbs the filtration: rows of order 0, 1, 2, ... enter `basis` (cleared first) until the chain of every
 /// segment has stalled or the rank is full. `on_order` receives the basis of `V_k` after each order.
 pub fn climb<R: DerivativeRows>(
     rows: &mut R,
@@ -52,8 +52,8 @@ pub fn climb<R: DerivativeRows>(
 /// Indistinguishable unknowns of every unknown: the other members of the null vectors of minimal support
 /// that contain it. They depend on the null space alone, not on a basis of it, and the relation is mutual.
 /// An observable unknown and an unknown that is not excited have none.
-pub fn partners(unknowns: usize, stairs: &[Echelon]) -> Vec<Vec<usize>> {
-    stairs.last().map_or_else(|| vec![Vec::new(); unknowns], Echelon::companions)
+pub fn partners(unknowns: usize, spans: &[Echelon]) -> Vec<Vec<usize>> {
+    spans.last().map_or_else(|| vec![Vec::new(); unknowns], Echelon::companions)
 }
 
 #[cfg(test)]
