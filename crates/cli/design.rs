@@ -145,7 +145,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
             a.output.write_folder(&*found, "design.json", || found.files(true))?;
             a.met.decide(first())
         }
-        Designed::Walks(found) => {
+        Designed::SlewSequence(found) => {
             a.output.write_folder(&*found, "walks.json", || Ok::<_, Failure>(found.files()))
         }
         Designed::Outputs(found) => {

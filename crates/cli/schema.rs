@@ -7,7 +7,7 @@ use obsdeg_core::certificate::{Certificate, ModelCertificate};
 use obsdeg_core::model::scheme_file::SchemeFile;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_core::system::model_file::ModelFile;
-use obsdeg_design::design::{Design, OptimumCertificate, Part, Walks};
+use obsdeg_design::design::{Design, OptimumCertificate, Part, ShortestSlewSequence};
 use obsdeg_design::next::NextPositions;
 use obsdeg_design::procedure::Procedure;
 use obsdeg_design::sensors::Sensors;
@@ -93,7 +93,7 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
         SchemaKind::Comparison => written::<Comparison>(),
         SchemaKind::Design => written::<Design>(),
         SchemaKind::Part => written::<Part>(),
-        SchemaKind::Walks => written::<Walks>(),
+        SchemaKind::Walks => written::<ShortestSlewSequence>(),
         SchemaKind::Sensors => written::<Sensors>(),
         SchemaKind::Next => written::<NextPositions>(),
         SchemaKind::Procedure => written::<Procedure>(),

@@ -21,7 +21,7 @@ fn cardinals() -> Scheme {
 }
 
 /// Random slew sequence with turns of 90 degrees about platform axes.
-fn walk(positions: usize, seed: u64) -> Scheme {
+fn slew_sequence(positions: usize, seed: u64) -> Scheme {
     let mut rng = SplitMix64::new(seed);
     let names = cardinal_names();
     let columns: Vec<[[i64; 3]; 3]> = names.iter().map(|n| integer_attitude(n)).collect();
@@ -115,7 +115,7 @@ fn self_calibration_with_slews() {
             ("F,I,O,S,GS,GM3,K0,K1,M6,K2", Some([21, 9, 3, 0])),
             ("F,I,O,S,GS,GM,K0,K1,M6,K2", None),
         ] {
-            let found = exact(&Scheme { unknowns: unknowns(terms), ..walk(31, seed) });
+            let found = exact(&Scheme { unknowns: unknowns(terms), ..slew_sequence(31, seed) });
             assert_eq!(found.1.rank_profile, [23, 33, 36], "{terms} {seed}");
             match observable {
                 Some(expected) => assert_eq!(by_degree(&found), expected, "{terms} {seed}"),
@@ -196,7 +196,7 @@ fn second_paths(cases: usize) {
         }
     }
     for terms in ["all", "F,I,O,S,GS,GM3,K0,K1,M6,K2", "F,I,O,S,GS,GM,K0,K1,M6,K2"] {
-        both_paths_agree(&Scheme { unknowns: unknowns(terms), ..walk(31, 5) });
+        both_paths_agree(&Scheme { unknowns: unknowns(terms), ..slew_sequence(31, 5) });
     }
     let all =
         ["F", "I", "O", "S", "II", "OO", "SS", "GS", "GM", "GM3", "K0", "K1", "M6", "M3", "K2", "K3", "Kx"];
@@ -213,7 +213,7 @@ fn second_paths(cases: usize) {
         }
         let carry = Carry::ALL[case % 3];
         let positions = 3 + rng.below(6) as usize;
-        let mut scheme = walk(positions, rng.next_u64());
+        let mut scheme = slew_sequence(positions, rng.next_u64());
         if case % 2 == 1 {
             // any attitudes, each reached from the one before by a turn about a platform axis
             let start = ["10,25,40", "-70,15,130"][case % 4 / 2];
@@ -275,7 +275,7 @@ fn laws() {
         let carry = Carry::ALL[case % 3];
         let positions = 2 + rng.below(8) as usize;
         let scheme = if case % 2 == 0 {
-            walk(positions, case as u64)
+            slew_sequence(positions, case as u64)
         } else {
             turned_about("5,20,-35", positions, &mut rng)
         };
@@ -378,7 +378,7 @@ fn rotations_by_the_second_path(cases: usize) {
 /// Rotations with errors of accelerometers and torquers: psi integrated along the rotation and samples of Z
 /// confirm the exact verdict. No degree is below that with the drifts alone.
 #[test]
-fn courses_by_samples() {
+fn histories_by_samples() {
     rotations_by_samples(10);
 }
 
@@ -458,37 +458,39 @@ fn a_torquer_about_the_vertical() {
 /// Fewest positions by quarter turns, with proof. Coefficients that no slew sequence determines are reported
 /// at once.
 #[test]
-fn fewest_positions_of_walks() {
-    use obsdeg_design::design::{Candidates, WalkOptions, scheme_of_walk, walks};
+fn fewest_positions_of_slew_sequences() {
+    use obsdeg_design::design::{
+        Candidates, SlewSequenceOptions, scheme_of_slew_sequence, shortest_slew_sequence,
+    };
     let base = Scheme { carry: Carry::Inertial, unknowns: unknowns("F,GS,GM,K0,K1"), ..Scheme::default() };
-    let options = WalkOptions {
+    let options = SlewSequenceOptions {
         candidates: Candidates::cardinals(),
         required: Vec::new(),
         most_turn_deg: 90.0,
         seed: 1,
     };
-    let found = walks(&base, &options, &|| true).expect("walks");
-    let fewest = found.positions.expect("a walk");
-    assert!(found.proven && found.never.is_empty() && found.walk.len() == fewest, "{found:?}");
-    let (names, degrees) = exact(&scheme_of_walk(&found, &base).expect("a scheme"));
+    let found = shortest_slew_sequence(&base, &options, &|| true).expect("an answer");
+    let fewest = found.positions.expect("a slew sequence");
+    assert!(found.proven && found.never.is_empty() && found.sequence.len() == fewest, "{found:?}");
+    let (names, degrees) = exact(&scheme_of_slew_sequence(&found, &base).expect("a scheme"));
     let seen = |(n, d): (&String, &Option<usize>)| n.starts_with("psi") || d.is_some();
     assert!(names.iter().zip(&degrees.degree).all(seen));
     // no random slew sequence with one position less suffices
     for seed in 0..300 {
-        let scheme = Scheme { unknowns: base.unknowns.clone(), ..walk(fewest - 1, seed) };
+        let scheme = Scheme { unknowns: base.unknowns.clone(), ..slew_sequence(fewest - 1, seed) };
         let (names, degrees) = exact(&scheme);
         assert!(!names.iter().zip(&degrees.degree).all(seen), "{seed}");
     }
     let hidden = Scheme { unknowns: unknowns("F,GS,K1,K3"), ..base };
-    let none = walks(&hidden, &options, &|| true).expect("walks");
-    let title = |w: &obsdeg_design::design::Walks| {
+    let none = shortest_slew_sequence(&hidden, &options, &|| true).expect("an answer");
+    let title = |w: &obsdeg_design::design::ShortestSlewSequence| {
         let text =
             obsdeg_report::written(w, obsdeg_report::Format::Table, obsdeg_report::TerminalLayout::default());
         text.expect("text").split_whitespace().collect::<Vec<_>>().join(" ")
     };
     // a sequence with all slews proves that no sequence suffices; an unsuccessful search does not
     assert!(!none.never.is_empty() && title(&none).contains("degrees makes every required"), "{none:?}");
-    let sought = obsdeg_design::design::Walks { never: Vec::new(), ..none.clone() };
+    let sought = obsdeg_design::design::ShortestSlewSequence { never: Vec::new(), ..none.clone() };
     assert!(title(&sought).contains("degrees was found that makes every required"), "{sought:?}");
     assert!(none.positions.is_none() && none.never.contains(&"K1_X".to_string()) && !none.proven, "{none:?}");
 }

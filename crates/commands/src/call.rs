@@ -344,7 +344,7 @@ fn designed<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>) -> 
     let asked: CommandRequest<Search, SearchFiles> = CommandRequest::read(request)?;
     match design(&asked.options, &asked.files, host)? {
         Designed::Schemes(found) => W::whole(*found, true, |f, pictures| f.files(pictures)),
-        Designed::Walks(found) => W::whole(*found, true, |f, _| Ok(f.files())),
+        Designed::SlewSequence(found) => W::whole(*found, true, |f, _| Ok(f.files())),
         Designed::Outputs(found) => W::whole(*found, true, drawn(sensor_figures)),
         Designed::Next(found) => W::whole(*found, true, drawn(next_figures)),
         Designed::Part(part) => {

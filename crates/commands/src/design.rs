@@ -9,9 +9,9 @@ use clap::{ArgGroup, Args};
 use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_core::model::{Angle, Carry, Scheme, parse_decimal};
 use obsdeg_design::design::{
-    Candidates, CriterionName, Design, DesignOptions, Immune, Part, Progress, WalkOptions,
-    asked as asked_conditions, certify_optimum, check_certifiable, design_merged, design_part, is_walk,
-    walks,
+    Candidates, CriterionName, Design, DesignOptions, Immune, Part, Progress, SlewSequenceOptions,
+    asked as asked_conditions, certify_optimum, check_certifiable, design_merged, design_part,
+    is_slew_sequence, shortest_slew_sequence,
 };
 use obsdeg_design::next::{NextOptions, NextPositions};
 use obsdeg_design::sensors::Sensors;
@@ -22,7 +22,7 @@ use serde_json::Value;
 
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, check_whole, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
-use crate::designed::{Designed, Searched, Walked};
+use crate::designed::{Designed, Searched, SearchedSlewSequence};
 use crate::host::{Host, Now};
 use crate::measure::{MeasureOptions, SetRequirements, measured};
 use crate::next::{FurtherOptions, calibrated, check_further, further};
@@ -344,13 +344,13 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     let (base, candidates, conditions) = assumed(a, files)?;
     idle(a, !files.merge.is_empty(), &base, &conditions)?;
     let options = design_options(a, candidates)?;
-    if a.max_turn.is_some() && !(a.minimum && is_walk(&base)) {
+    if a.max_turn.is_some() && !(a.minimum && is_slew_sequence(&base)) {
         return Err(Problem::input(
             "--max-turn is for --minimum with torquer errors (GS, GM, GM3) under inertial carry",
         ));
     }
-    if a.minimum && is_walk(&base) {
-        return fewest_of_walks(a, base, options, host);
+    if a.minimum && is_slew_sequence(&base) {
+        return fewest_positions_of_slew_sequence(a, base, options, host);
     }
     if a.certificate {
         if a.part.is_some() || !files.merge.is_empty() {
@@ -696,7 +696,7 @@ fn read_part(part: &Source) -> Result<Part, Problem> {
 }
 
 /// Fewest positions where the slew path between them counts.
-fn fewest_of_walks(
+fn fewest_positions_of_slew_sequence(
     a: &Search,
     base: Scheme,
     options: DesignOptions,
@@ -706,14 +706,14 @@ fn fewest_of_walks(
         let text = "--gimbal is not taken where torquer errors make a scheme a walk; expected --max-turn, --observable";
         return Err(Problem::input(text));
     }
-    let options = WalkOptions {
+    let options = SlewSequenceOptions {
         candidates: options.candidates,
         required: options.required,
         most_turn_deg: a.max_turn.unwrap_or(90.0),
         seed: options.seed,
     };
-    let found = walks(&base, &options, &|| (host.going)(Now::of("searching walks", 0, 1)))?;
-    Ok(Designed::Walks(Box::new(Walked { found, base })))
+    let found = shortest_slew_sequence(&base, &options, &|| (host.going)(Now::of("searching walks", 0, 1)))?;
+    Ok(Designed::SlewSequence(Box::new(SearchedSlewSequence { found, base })))
 }
 
 /// Default of `--candidates`.

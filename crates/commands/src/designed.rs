@@ -2,7 +2,9 @@
 
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::scheme_file::write;
-use obsdeg_design::design::{Design, DesignError, Found, Part, Walks, scheme_found, scheme_of_walk};
+use obsdeg_design::design::{
+    Design, DesignError, Found, Part, ShortestSlewSequence, scheme_found, scheme_of_slew_sequence,
+};
 use obsdeg_design::next::NextPositions;
 use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::simulation::Conditions;
@@ -19,7 +21,7 @@ pub enum Designed {
     /// Schemes.
     Schemes(Box<Searched>),
     /// Fewest positions where the slew path between them counts.
-    Walks(Box<Walked>),
+    SlewSequence(Box<SearchedSlewSequence>),
     /// Part of a search.
     Part(Box<Part>),
     /// Sets of outputs of a model.
@@ -45,9 +47,9 @@ pub struct Searched {
 /// Found slew sequences, with the base scheme of the search.
 #[derive(Debug, Serialize)]
 #[serde(transparent)]
-pub struct Walked {
+pub struct SearchedSlewSequence {
     /// Found slew sequences.
-    pub found: Walks,
+    pub found: ShortestSlewSequence,
     #[serde(skip)]
     pub(crate) base: Scheme,
 }
@@ -74,7 +76,7 @@ impl Answer for Searched {
     }
 }
 
-impl Answer for Walked {
+impl Answer for SearchedSlewSequence {
     fn layout(&self) -> Option<&str> {
         self.found.layout()
     }
@@ -92,10 +94,10 @@ impl Answer for Walked {
     }
 }
 
-impl Walked {
+impl SearchedSlewSequence {
     /// Files beside the JSON: the found scheme.
     pub fn files(&self) -> Vec<File> {
-        let scheme = scheme_of_walk(&self.found, &self.base);
+        let scheme = scheme_of_slew_sequence(&self.found, &self.base);
         let file = |s: Scheme| File { name: "winner.toml".into(), bytes: write(&s).into_bytes() };
         scheme.map(file).into_iter().collect()
     }

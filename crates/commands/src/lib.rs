@@ -44,7 +44,7 @@ pub use compare::{Compare, compare};
 pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions, RequirementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};
 pub use design::{DegreeCap, Search, SearchFiles, WantedOptions, design, is_word};
-pub use designed::{Designed, Searched, Walked};
+pub use designed::{Designed, Searched, SearchedSlewSequence};
 pub use host::{Host, Now};
 pub use measure::MeasureOptions;
 pub use next::FurtherOptions;

@@ -61,7 +61,7 @@ fn twelve_certified(bencher: Bencher<'_, '_>) {
         let evaluator = reset(&candidates);
         let search = SequenceSearch {
             rows: &rows,
-            walks: false,
+            slew_sequences: false,
             evaluator: &evaluator,
             criterion: &Criterion::D,
             constraints: &Constraints::default(),
@@ -125,7 +125,7 @@ fn best_five_of_24(bencher: Bencher<'_, '_>) {
     let evaluator = Evaluator::new(&base, &candidates, &ALL, &Conditions::default()).expect("an evaluator");
     let search = SequenceSearch {
         rows: &rows,
-        walks: false,
+        slew_sequences: false,
         evaluator: &evaluator,
         criterion: &Criterion::Worst,
         constraints: &Constraints::default(),
@@ -162,7 +162,7 @@ fn pruned(carry: Carry, k: usize) -> Best {
         constraints: &Constraints::default(),
         keep: 10,
         floor: 2,
-        walks: false,
+        slew_sequences: false,
         progress: &|_| true,
     };
     search.exhaust_pruned(&rows.symmetry(&|_, _| true), k, 1)

@@ -51,6 +51,7 @@ mod sensor_noise;
 mod sensors;
 mod series;
 mod simulation;
+mod slew_sequence;
 mod stated;
 mod system;
 mod system_calibration;
@@ -58,7 +59,6 @@ mod table;
 mod tables;
 mod vector;
 mod visible;
-mod walks;
 mod why;
 mod words;
 

@@ -1,13 +1,13 @@
 //! Fewest positions where the slew path between them counts.
 
-use obsdeg_design::design::Walks;
+use obsdeg_design::design::ShortestSlewSequence;
 
 use crate::Answer;
 use crate::document::{Document, DocumentBlock, left, right};
 use crate::words::{reasons, wrong_below};
 
 /// Sentences on the examined slew sequences and their consequence.
-fn examined(w: &Walks) -> Vec<String> {
+fn examined(w: &ShortestSlewSequence) -> Vec<String> {
     let mut out = vec![format!(
         "a position adds at most {} independent rows, and {} coefficients are required: fewer than {} are never enough",
         w.rows_per_position,
@@ -15,8 +15,8 @@ fn examined(w: &Walks) -> Vec<String> {
         w.counting_bound
     )];
     out.extend(
-        w.none_of.iter().map(|[positions, walks]| {
-            format!("none of the {walks} walks of {positions} does, by exhaustion")
+        w.none_of.iter().map(|[positions, count]| {
+            format!("none of the {count} walks of {positions} does, by exhaustion")
         }),
     );
     out.push(match (w.positions, w.proven) {
@@ -44,7 +44,7 @@ fn examined(w: &Walks) -> Vec<String> {
     out
 }
 
-impl Answer for Walks {
+impl Answer for ShortestSlewSequence {
     fn layout(&self) -> Option<&str> {
         Some(&self.schema)
     }
@@ -54,7 +54,7 @@ impl Answer for Walks {
             vec![format!("p{}", i + 1), name.clone(), angles.clone()]
         };
         let columns = vec![left("position"), left("X_p Y_p Z_p"), right("alpha, beta, gamma [deg]")];
-        let rows = self.walk.iter().zip(&self.angles).enumerate().map(row);
+        let rows = self.sequence.iter().zip(&self.angles).enumerate().map(row);
         let title = match self.positions {
             Some(k) => format!(
                 "{k} positions that make every required coefficient observable, by turns of at most {} degrees",

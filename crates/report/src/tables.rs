@@ -54,7 +54,7 @@ pub(crate) fn of_json(answer: &Value) -> Vec<Table> {
     let mut out = Vec::new();
     if let Value::Object(fields) = answer {
         let mut own = Vec::new();
-        walk(fields, "", &mut own, "", &[], &mut out);
+        visit(fields, "", &mut own, "", &[], &mut out);
         out.insert(0, Table::of("answer".into(), &[own]));
     }
     out
@@ -79,7 +79,7 @@ fn path(above: &str, key: &str) -> String {
 }
 
 /// Adds the fields of an object to `row`, and the lists of objects below it to `out`.
-fn walk(
+fn visit(
     fields: &Map<String, Value>,
     column: &str,
     row: &mut Vec<(String, String)>,
@@ -89,7 +89,7 @@ fn walk(
 ) {
     for (key, value) in fields {
         match value {
-            Value::Object(below) => walk(below, &path(column, key), row, &path(table, key), keys, out),
+            Value::Object(below) => visit(below, &path(column, key), row, &path(table, key), keys, out),
             Value::Array(items) if items.iter().any(|v| v.is_object() || v.is_array()) => {
                 list(items, &path(table, key), keys, out);
             }
@@ -118,7 +118,7 @@ fn list(items: &[Value], name: &str, keys: &[(String, String)], out: &mut Vec<Ta
                 let key = (format!("{name}.name"), known.map_or_else(|| (i + 1).to_string(), text));
                 let keys: Vec<_> = keys.iter().cloned().chain([key]).collect();
                 let mut found = Vec::new();
-                walk(fields, "", &mut row, name, &keys, &mut found);
+                visit(fields, "", &mut row, name, &keys, &mut found);
                 rows.push(row);
                 merge(&mut below, found);
             }

@@ -387,7 +387,7 @@ fn searches_order_as_brute_force(tasks: usize) {
             // exchange may miss the best sequence, but its values are correct and never better than the best
             let search = SequenceSearch {
                 rows: &all.rows,
-                walks: false,
+                slew_sequences: false,
                 evaluator: &all.evaluator,
                 criterion: &all.criterion,
                 constraints: &all.constraints,
@@ -454,7 +454,7 @@ fn bounds_miss_nothing(tasks: u64) {
                 constraints: &all.constraints,
                 keep: 1 + seed as usize % 4,
                 floor: all.floor,
-                walks: false,
+                slew_sequences: false,
                 progress: &on,
             };
             let (symmetry, k) =

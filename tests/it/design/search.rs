@@ -166,7 +166,7 @@ fn turned_schemes_are_equally_good() {
     let of = |symmetry: &CandidateSymmetry| {
         let search = SequenceSearch {
             rows: &rows,
-            walks: false,
+            slew_sequences: false,
             evaluator: &evaluator,
             criterion: &Criterion::A,
             constraints: &Constraints::default(),

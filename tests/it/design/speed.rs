@@ -40,7 +40,7 @@ fn a_pruned_search_has_one_answer_on_any_number_of_threads() {
             constraints: &constraints,
             keep: 10,
             floor: 2,
-            walks: false,
+            slew_sequences: false,
             progress: &on,
         };
         let symmetry = rows.symmetry(&|_, _| true);

@@ -139,7 +139,7 @@ fn the_best_is_the_best_of_all() {
 /// Slew sequences on which torquer errors act: results are observable and have the sigmas that a comparison
 /// states, half turns included.
 #[test]
-fn walks_by_sigma() {
+fn slew_sequences_by_sigma() {
     let like = whole("F,GS,GM,K0,K1,M3", Carry::Inertial);
     let conditions = Conditions { slew_rate_deg_s: Some(1.0), ..quiet() };
     let options = DesignOptions { criterion: CriterionName::D, restarts: 3, keep: 3, ..options(Some(7)) };
@@ -189,7 +189,7 @@ fn turned_schemes_are_equally_good() {
             let of = |symmetry: &CandidateSymmetry| {
                 let search = SequenceSearch {
                     rows: &rows,
-                    walks: false,
+                    slew_sequences: false,
                     evaluator: &evaluator,
                     criterion: &Criterion::Worst,
                     constraints: &Constraints::default(),

@@ -22,7 +22,10 @@ pub use measure::evaluator::{Evaluator, SequenceState};
 pub use measure::stop::Stop;
 pub use nearest::Nearest;
 pub use observable::rows::{AttitudeRows, EnumerationLimits};
-pub use observable::slew_sequences::{WalkOptions, Walks, is_walk, scheme_of_walk, walks};
+pub use observable::slew_sequences::{
+    ShortestSlewSequence, SlewSequenceOptions, is_slew_sequence, scheme_of_slew_sequence,
+    shortest_slew_sequence,
+};
 pub use observable::symmetry::CandidateSymmetry;
 pub use request::candidates::Candidates;
 pub use request::error::{DesignError, PartError};

@@ -28,9 +28,9 @@ use crate::design::request::error::DesignError;
 use crate::design::request::limits::PROOF;
 
 /// Name and version of the JSON layout.
-const WALKS_SCHEMA: &str = "obsdeg.walks/1";
+const SLEW_SEQUENCE_SCHEMA: &str = "obsdeg.walks/1";
 /// Largest number of slew sequences of one length that are examined.
-const MOST_WALKS: u64 = 100_000_000;
+const MOST_SEQUENCES: u64 = 100_000_000;
 /// Largest number of candidates: every turn between two of them is a position of the tour.
 const MOST_TURNS: usize = 900;
 /// Beam width: sequences of each length that are extended in the search for a short one.
@@ -42,7 +42,7 @@ const PATIENCE: u64 = 256;
 
 /// Options of a search for the shortest slew sequence.
 #[derive(Debug, Clone, PartialEq)]
-pub struct WalkOptions {
+pub struct SlewSequenceOptions {
     /// Candidate attitudes.
     pub candidates: Candidates,
     /// Coefficients or families that must be observable; if empty, all coefficients.
@@ -55,7 +55,8 @@ pub struct WalkOptions {
 
 /// Shortest slew sequence that makes every required coefficient observable.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Walks {
+#[schemars(rename = "Walks")]
+pub struct ShortestSlewSequence {
     /// Layout of this answer: `obsdeg.walks/1`.
     pub schema: String,
     /// Version of the program that wrote it.
@@ -74,7 +75,8 @@ pub struct Walks {
     pub positions: Option<usize>,
     /// Slew sequence that makes all required coefficients observable: its candidates, in order; empty if none
     /// was found.
-    pub walk: Vec<String>,
+    #[serde(rename = "walk")]
+    pub sequence: Vec<String>,
     /// Euler angles of its positions, in degrees.
     pub angles: Vec<String>,
     /// Rank of the slew sequence, then the number of unknowns.
@@ -153,26 +155,26 @@ impl TourRows {
         let zero = vec![0; self.coefficients];
         let torqued = [zero.clone(), zero.clone(), zero];
         let basis = Echelon::new(self.field, 3 + self.coefficients);
-        let mut walk = SlewSequence { places: Vec::new(), torqued, basis };
-        self.arrive(&mut walk, place);
-        walk
+        let mut sequence = SlewSequence { places: Vec::new(), torqued, basis };
+        self.arrive(&mut sequence, place);
+        sequence
     }
 
-    fn arrive(&self, walk: &mut SlewSequence, place: usize) {
+    fn arrive(&self, sequence: &mut SlewSequence, place: usize) {
         let f = &self.field;
-        walk.places.push(place);
+        sequence.places.push(place);
         let mut row = vec![0; 3 + self.coefficients];
         for (psi, rest) in self.of_psi.iter().zip(&self.rows[place]) {
             row[..3].copy_from_slice(psi);
             for (k, slot) in row[3..].iter_mut().enumerate() {
-                *slot = f.dot(rest[k], (0..3).map(|r| (psi[r], walk.torqued[r][k])));
+                *slot = f.dot(rest[k], (0..3).map(|r| (psi[r], sequence.torqued[r][k])));
             }
-            walk.basis.insert(&row);
+            sequence.basis.insert(&row);
         }
     }
 
-    fn go(&self, walk: &SlewSequence, turn: usize, to: usize) -> SlewSequence {
-        let mut next = walk.clone();
+    fn go(&self, sequence: &SlewSequence, turn: usize, to: usize) -> SlewSequence {
+        let mut next = sequence.clone();
         for (sum, left) in next.torqued.iter_mut().zip(&self.turns[turn]) {
             for (x, y) in sum.iter_mut().zip(left) {
                 *x = self.field.add(*x, *y);
@@ -250,12 +252,12 @@ impl SlewSequenceSearch {
     fn exhausted(
         &self,
         lengths: Range<usize>,
-        out: &mut Walks,
+        out: &mut ShortestSlewSequence,
         going: &(dyn Fn() -> bool + Sync),
     ) -> (Option<Vec<usize>>, bool) {
         for length in lengths {
-            let count = self.walks(length);
-            if count > MOST_WALKS {
+            let count = self.sequences(length);
+            if count > MOST_SEQUENCES {
                 return (None, false);
             }
             let seen = AtomicU64::new(0);
@@ -285,31 +287,31 @@ impl SlewSequenceSearch {
         self.required.iter().all(|c| basis.has_unit(3 + c))
     }
 
-    /// First sufficient slew sequence of `length` positions that begins with `walk`.
+    /// First sufficient slew sequence of `length` positions that begins with `sequence`.
     fn search(
         &self,
-        walk: &SlewSequence,
+        sequence: &SlewSequence,
         length: usize,
         seen: &AtomicU64,
         going: &(dyn Fn() -> bool + Sync),
     ) -> Option<Vec<usize>> {
-        if walk.places.len() == length {
+        if sequence.places.len() == length {
             if seen.fetch_add(1, Ordering::Relaxed).is_multiple_of(PATIENCE) && !going() {
                 return None;
             }
-            return (self.does(&walk.basis) || self.does_elsewhere(&walk.places))
-                .then(|| walk.places.clone());
+            return (self.does(&sequence.basis) || self.does_elsewhere(&sequence.places))
+                .then(|| sequence.places.clone());
         }
-        let left = length - walk.places.len();
+        let left = length - sequence.places.len();
         // every required coefficient needs a row of its own
-        if walk.basis.rank() + self.most * left < self.required.len() || !going() {
+        if sequence.basis.rank() + self.most * left < self.required.len() || !going() {
             return None;
         }
-        let here = *walk.places.last()?;
+        let here = *sequence.places.last()?;
         let next = |&(turn, to): &(usize, usize)| {
-            self.search(&self.fields[0].go(walk, turn, to), length, seen, going)
+            self.search(&self.fields[0].go(sequence, turn, to), length, seen, going)
         };
-        if walk.places.len() < 4 {
+        if sequence.places.len() < 4 {
             let neighbours = &self.neighbours[here];
             parallel::find_first(neighbours.len(), |i| next(&neighbours[i]))
         } else {
@@ -321,32 +323,32 @@ impl SlewSequenceSearch {
     fn does_elsewhere(&self, places: &[usize]) -> bool {
         let field = &self.fields[1];
         let Some((&first, rest)) = places.split_first() else { return false };
-        let mut walk = field.start(first);
+        let mut sequence = field.start(first);
         for &to in rest {
-            let here = walk.places[walk.places.len() - 1];
+            let here = sequence.places[sequence.places.len() - 1];
             let Some(&(turn, _)) = self.neighbours[here].iter().find(|n| n.1 == to) else { return false };
-            walk = field.go(&walk, turn, to);
+            sequence = field.go(&sequence, turn, to);
         }
-        self.does(&walk.basis)
+        self.does(&sequence.basis)
     }
 
     /// Sequence through the given candidates in the first field; a candidate that no turn leads to
     /// begins a new one.
     fn along(&self, places: &[usize]) -> SlewSequence {
         let field = &self.fields[0];
-        let mut walk = field.start(places[0]);
+        let mut sequence = field.start(places[0]);
         for &to in &places[1..] {
-            let here = walk.places[walk.places.len() - 1];
+            let here = sequence.places[sequence.places.len() - 1];
             match self.neighbours[here].iter().find(|n| n.1 == to) {
-                Some(&(turn, _)) => walk = field.go(&walk, turn, to),
-                None => field.arrive(&mut walk, to),
+                Some(&(turn, _)) => sequence = field.go(&sequence, turn, to),
+                None => field.arrive(&mut sequence, to),
             }
         }
-        walk
+        sequence
     }
 
     /// Number of slew sequences of `length` positions.
-    fn walks(&self, length: usize) -> u64 {
+    fn sequences(&self, length: usize) -> u64 {
         let n = self.neighbours.len();
         let mut ends = vec![1u64; n];
         for _ in 1..length {
@@ -371,9 +373,12 @@ impl SlewSequenceSearch {
             if !going() {
                 return None;
             }
-            let grown = |walk: &SlewSequence| -> Vec<SlewSequence> {
-                let here = walk.places[walk.places.len() - 1];
-                self.neighbours[here].iter().map(|&(turn, to)| self.fields[0].go(walk, turn, to)).collect()
+            let grown = |sequence: &SlewSequence| -> Vec<SlewSequence> {
+                let here = sequence.places[sequence.places.len() - 1];
+                self.neighbours[here]
+                    .iter()
+                    .map(|&(turn, to)| self.fields[0].go(sequence, turn, to))
+                    .collect()
             };
             let next: Vec<SlewSequence> = parallel::map(beam.len(), |i| grown(&beam[i])).concat();
             let mut order: Vec<(usize, u64, usize)> = next
@@ -394,11 +399,11 @@ impl SlewSequenceSearch {
 ///
 /// # Errors
 /// [`DesignError`].
-pub fn walks(
+pub fn shortest_slew_sequence(
     base: &Scheme,
-    options: &WalkOptions,
+    options: &SlewSequenceOptions,
     going: &(dyn Fn() -> bool + Sync),
-) -> Result<Walks, DesignError> {
+) -> Result<ShortestSlewSequence, DesignError> {
     let attitudes = &options.candidates.attitudes;
     let (neighbours, tour) = tour(attitudes, options.most_turn_deg);
     let turns: usize = neighbours.iter().map(Vec::len).sum();
@@ -414,8 +419,8 @@ pub fn walks(
     let never: Vec<String> = lost.map(|&c| all[c].clone()).collect();
     let shortest = if never.is_empty() { space.short(options.seed, going) } else { None };
     let longest = shortest.as_ref().map_or(LONGEST, |w| w.places.len());
-    let mut out = Walks {
-        schema: WALKS_SCHEMA.into(),
+    let mut out = ShortestSlewSequence {
+        schema: SLEW_SEQUENCE_SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
         terms: base.unknowns.to_string(),
         candidates: options.candidates.names.clone(),
@@ -423,7 +428,7 @@ pub fn walks(
         turns,
         required: space.required.iter().map(|&c| all[c].clone()).collect(),
         positions: None,
-        walk: Vec::new(),
+        sequence: Vec::new(),
         angles: Vec::new(),
         rank: [0, 3 + space.fields[0].coefficients],
         latitude_deg: base.latitude.map(|l| l.degrees()),
@@ -443,7 +448,7 @@ pub fn walks(
         out.rank[0] = space.along(&places).basis.rank();
         let angles = |&c: &usize| obsdeg_core::model::angles_text(&attitudes[c]);
         out.angles = places.iter().map(angles).collect();
-        out.walk = places.iter().map(|&c| options.candidates.names[c].clone()).collect();
+        out.sequence = places.iter().map(|&c| options.candidates.names[c].clone()).collect();
     }
     out.proven = complete && out.positions.is_some() && out.error_bound < PROOF;
     Ok(out)
@@ -472,7 +477,7 @@ fn required(all: &[String], asked_for: &[String]) -> Result<Vec<usize>, DesignEr
 }
 
 /// Slew sequence as a scheme under the assumptions of `base`; `None` where none was found.
-pub fn scheme_of_walk(found: &Walks, base: &Scheme) -> Option<Scheme> {
+pub fn scheme_of_slew_sequence(found: &ShortestSlewSequence, base: &Scheme) -> Option<Scheme> {
     let attitudes: Result<Vec<Euler>, _> = found.angles.iter().map(|a| parse_attitude(a)).collect();
     let positions = Scheme::of_angles(attitudes.ok()?).positions;
     (!positions.is_empty()).then(|| Scheme { positions, path: Some(Path::OneAxis), ..base.clone() })
@@ -509,8 +514,8 @@ fn tour(attitudes: &[Euler], most_turn_deg: f64) -> (Vec<Vec<usize>>, Vec<usize>
     (neighbours, tour)
 }
 
-/// True if torquer errors act in the turns of `base`: then [`walks`] finds schemes, and no search over
-/// sets does.
-pub fn is_walk(base: &Scheme) -> bool {
+/// True if torquer errors act in the turns of `base`: then [`shortest_slew_sequence`] finds schemes, and no
+/// search over sets does.
+pub fn is_slew_sequence(base: &Scheme) -> bool {
     base.carry == Carry::Inertial && base.unknowns.have(ErrorSource::Rate)
 }

@@ -257,7 +257,7 @@ pub enum DesignError {
          slews that take time (--slew-rate), about one axis, between cardinal attitudes, by exchange (no \
          --refine, --divide, --part, or cap of degrees); --minimum finds the fewest positions"
     )]
-    Walks {
+    SlewSequences {
         /// Option or input that does not apply.
         found: String,
     },

@@ -171,7 +171,9 @@ impl AlternativeSearch<'_> {
             // do not fit in memory
             let best = match self.exchanged(k, Some(grid), RESTARTS / 2, Vec::new()) {
                 Err(
-                    DesignError::Walks { .. } | DesignError::Pairs { .. } | DesignError::Candidates { .. },
+                    DesignError::SlewSequences { .. }
+                    | DesignError::Pairs { .. }
+                    | DesignError::Candidates { .. },
                 ) => return Ok(()),
                 best => best?,
             };

@@ -279,7 +279,7 @@ impl SchemeSearch<'_> {
             ties: all.then(|| TiesReport { sequences: best.ties.total(task.symmetry.order), within: TIE }),
             order_matters: evaluator.ordered(),
             interrupted: false,
-            degree_floor: (!task.walks).then_some(self.search.floor),
+            degree_floor: (!task.slew_sequences).then_some(self.search.floor),
             constraints: task.constraints_in_words(),
             ranked: task.ranks().then_some(best.found.len()),
             certificate: None,

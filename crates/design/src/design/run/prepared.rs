@@ -6,7 +6,7 @@ use obsdeg_evidence::simulation::Conditions;
 use crate::design::certificate::Bound;
 use crate::design::certificate::value::excess;
 use crate::design::measure::evaluator::Evaluator;
-use crate::design::observable::slew_sequences::is_walk;
+use crate::design::observable::slew_sequences::is_slew_sequence;
 use crate::design::request::error::DesignError;
 use crate::design::request::limits::{EXHAUSTIVE, MANY, QUICK};
 use crate::design::request::options::DesignOptions;
@@ -41,8 +41,8 @@ impl<'a> PreparedSearch<'a> {
         options: &'a DesignOptions,
         going: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
-        if is_walk(base) {
-            check_walks(base, conditions, options)?;
+        if is_slew_sequence(base) {
+            check_slew_sequence(base, conditions, options)?;
         }
         let (reached, beyond) = options.candidates.clone().within(&base.gimbals);
         let task = Task::new(base, conditions, options, reached)?;
@@ -69,7 +69,7 @@ impl<'a> PreparedSearch<'a> {
     ) -> SequenceSearch<'s> {
         SequenceSearch {
             rows: &self.task.rows,
-            walks: self.task.walks,
+            slew_sequences: self.task.slew_sequences,
             evaluator: &self.evaluator,
             criterion: &self.task.criterion,
             constraints: &self.task.constraints,
@@ -93,7 +93,7 @@ impl<'a> PreparedSearch<'a> {
                 self.conditions.dwell_s
             ));
         }
-        if self.task.walks {
+        if self.task.slew_sequences {
             return Ok(());
         }
         let never: Vec<&str> = self.task.never(&self.degrees).collect();
@@ -150,8 +150,8 @@ impl<'a> PreparedSearch<'a> {
 
     /// Numbers of sets and of sequences of an exhaustive search.
     pub(crate) fn exhaustible(&self, k: usize) -> Result<(u64, u64), DesignError> {
-        if self.task.walks {
-            return Err(DesignError::Walks { found: "a search of all sequences".into() });
+        if self.task.slew_sequences {
+            return Err(DesignError::SlewSequences { found: "a search of all sequences".into() });
         }
         let too_many = DesignError::TooMany { positions: k, candidates: self.task.rows.candidates() };
         self.task.space(k, &self.evaluator).ok_or(too_many)
@@ -159,7 +159,11 @@ impl<'a> PreparedSearch<'a> {
 }
 
 /// Refuses options that do not apply where torquer errors act in turns.
-fn check_walks(base: &Scheme, conditions: &Conditions, options: &DesignOptions) -> Result<(), DesignError> {
+fn check_slew_sequence(
+    base: &Scheme,
+    conditions: &Conditions,
+    options: &DesignOptions,
+) -> Result<(), DesignError> {
     let whole = |x: &f64| (x - x.round()).abs() < 1e-12;
     let cardinal = |a: &Euler| c_n_f64(a).as_flattened().iter().all(whole);
     let other = options.candidates.attitudes.iter().position(|a| !cardinal(a));
@@ -172,7 +176,7 @@ fn check_walks(base: &Scheme, conditions: &Conditions, options: &DesignOptions) 
         (!options.degree_caps.is_empty()).then(|| "a cap of degrees".into()),
     ];
     match found.into_iter().flatten().next() {
-        Some(found) => Err(DesignError::Walks { found }),
+        Some(found) => Err(DesignError::SlewSequences { found }),
         None => Ok(()),
     }
 }

@@ -19,7 +19,7 @@ use crate::design::measure::evaluator::Evaluator;
 use crate::design::measure::omitted::OmittedErrors;
 use crate::design::measure::stop::Stop;
 use crate::design::observable::rows::AttitudeRows;
-use crate::design::observable::slew_sequences::is_walk;
+use crate::design::observable::slew_sequences::is_slew_sequence;
 use crate::design::observable::symmetry::CandidateSymmetry;
 use crate::design::polish::{divide, refine};
 use crate::design::request::candidates::Candidates;
@@ -84,7 +84,7 @@ pub(crate) struct Task<'a> {
     /// Units of all coefficients.
     units: Vec<&'static str>,
     /// True if torquer errors act in the turns between positions: sets have no verdict then.
-    pub(crate) walks: bool,
+    pub(crate) slew_sequences: bool,
 }
 
 /// Checks the numbers of candidates and positions, the limits, and that the base and all angles are of a kind
@@ -293,9 +293,10 @@ impl<'a> Task<'a> {
         let omitted = omitted.filter(|_| !of_psi || conditions.bench.is_empty());
         let criterion = criterion(options.criterion, &limits);
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
-        let walks = is_walk(base);
+        let slew_sequences = is_slew_sequence(base);
         // for slew sequences the rows only tell which attitudes are the same
-        let by_sets = Scheme { carry: if walks { Carry::Platform } else { base.carry }, ..base.clone() };
+        let by_sets =
+            Scheme { carry: if slew_sequences { Carry::Platform } else { base.carry }, ..base.clone() };
         let rows = AttitudeRows::new(&by_sets, &candidates.attitudes, &indices, options.seed)?;
         // a turn of the platform axes renames psi as well
         let renames = (!uses_requirements || limits.psi.iter().all(|l| *l == limits.psi[0]))
@@ -323,7 +324,7 @@ impl<'a> Task<'a> {
             immune_units: OmittedErrors::units(&platform, &options.immune),
             slews: conditions.slew_rate_deg_s.is_some(),
             units: platform.units()[first..].to_vec(),
-            walks,
+            slew_sequences,
         })
     }
 
@@ -371,13 +372,17 @@ impl<'a> Task<'a> {
             counting_bound: self.rows.counting_bound(),
             rows_per_position: self.rows.most(),
             none_of: Vec::new(),
-            never: if self.walks { Vec::new() } else { self.never(best_degrees).map(Into::into).collect() },
+            never: if self.slew_sequences {
+                Vec::new()
+            } else {
+                self.never(best_degrees).map(Into::into).collect()
+            },
             proven: true,
         };
         if !out.never.is_empty() {
             return Ok(out);
         }
-        if self.walks {
+        if self.slew_sequences {
             return Ok(Minimum { counting_bound: 0, proven: false, ..out });
         }
         let firsts = self.symmetry.representatives();
@@ -407,7 +412,7 @@ impl<'a> Task<'a> {
     /// Number of sets of an exhaustive search of `k` positions, and of its sequences up to symmetry;
     /// `None` if too many to store or to count.
     pub(crate) fn space(&self, k: usize, evaluator: &Evaluator) -> Option<(u64, u64)> {
-        if self.walks {
+        if self.slew_sequences {
             return None;
         }
         let n = self.rows.candidates() as u64;
@@ -480,11 +485,11 @@ impl<'a> Task<'a> {
         let mut stops = Scheme::of_angles(attitudes).positions;
         let half_turns = evaluator.half_turns(sequence);
         for (k, turn) in &half_turns {
-            stops[*k].slew = self.walks.then(|| winner::half_turn(&turn.about));
+            stops[*k].slew = self.slew_sequences.then(|| winner::half_turn(&turn.about));
         }
         let scheme = Scheme {
             positions: stops,
-            path: if self.walks { Some(Path::OneAxis) } else { self.base.path },
+            path: if self.slew_sequences { Some(Path::OneAxis) } else { self.base.path },
             latitude: latitude_of(self.base),
             combinations: Vec::new(),
             ..self.base.clone()

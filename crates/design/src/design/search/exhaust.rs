@@ -287,7 +287,7 @@ impl SequenceSearch<'_> {
     pub(crate) fn few(&self, symmetry: &CandidateSymmetry, k: usize, most: f64) -> Option<Vec<Vec<Stop>>> {
         let firsts = symmetry.representatives().len() as f64;
         let all = || self.starts_of(k, symmetry);
-        (firsts * self.behind(k - 1) <= most && !self.walks)
+        (firsts * self.behind(k - 1) <= most && !self.slew_sequences)
             .then(all)
             .filter(|s| s.len() as f64 <= 8.0 * most)
     }

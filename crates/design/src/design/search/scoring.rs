@@ -14,7 +14,7 @@ pub struct SequenceSearch<'a> {
     pub rows: &'a AttitudeRows,
     /// True if torquer errors act in turns. Sets have no verdict then; a sequence counts if its samples
     /// determine the required coefficients.
-    pub walks: bool,
+    pub slew_sequences: bool,
     /// Evaluator of sigmas.
     pub evaluator: &'a Evaluator,
     /// Criterion to minimise.
@@ -52,7 +52,7 @@ impl SequenceSearch<'_> {
     /// Worst degree of every observable set if it is known beforehand: at least that of all candidates
     /// together, at most the last order. `None` if sets differ.
     pub(crate) fn only_degree(&self) -> Option<usize> {
-        if self.walks {
+        if self.slew_sequences {
             return Some(0);
         }
         (self.constraints.degrees.is_none() && self.floor == self.rows.last_order()).then_some(self.floor)
@@ -87,7 +87,7 @@ impl SequenceSearch<'_> {
     /// Score corrected where the exact verdict, of instantaneous repositioning, misses a coefficient
     /// that slews may determine.
     pub(crate) fn judged(&self, mut scored: Scored) -> Scored {
-        if self.walks {
+        if self.slew_sequences {
             return scored;
         }
         let degrees = self.rows.likely_degrees(&candidates(&scored.sequence));
