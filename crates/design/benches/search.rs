@@ -71,7 +71,7 @@ fn twelve_certified(bencher: Bencher<'_, '_>) {
         };
         let found = search.exchange(12, &[], 200, 1);
         let bound = evaluator.bound(&Criterion::D, 12, &[], &|| true).expect("a bound");
-        let efficiency = (bound.value / found.found[0].worth.value).powi(2);
+        let efficiency = (bound.value / found.found[0].score.value).powi(2);
         assert!(efficiency > 0.9999, "{efficiency}");
         efficiency
     });

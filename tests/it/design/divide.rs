@@ -56,11 +56,11 @@ fn time_is_divided_as_well_as_can_be() {
         let best = at(&tens);
         assert!((best / divided.value - 1.0).abs() < 1e-6, "{carry}: {best} {divided:?}");
         assert!((at(&vec![20; k]) / equal.value - 1.0).abs() < 1e-6);
-        let mut worth = Vec::new();
+        let mut gains = Vec::new();
         for to in 0..k {
             let mut longer = tens.clone();
             longer[to] += 1;
-            worth.push(best - at(&longer));
+            gains.push(best - at(&longer));
             for from in (0..k).filter(|&from| from != to && tens[from] > 1) {
                 let mut moved = longer.clone();
                 moved[from] -= 1;
@@ -70,8 +70,8 @@ fn time_is_divided_as_well_as_can_be() {
         if carry == Carry::Platform {
             // equal up to the second difference of one step (the variance falls with the cube of a dwell)
             let (least, most) =
-                (worth.iter().copied().fold(f64::MAX, f64::min), worth.iter().copied().fold(0.0, f64::max));
-            assert!(least > 0.0 && most < least * 1.6, "{carry}: {worth:?} {tens:?}");
+                (gains.iter().copied().fold(f64::MAX, f64::min), gains.iter().copied().fold(0.0, f64::max));
+            assert!(least > 0.0 && most < least * 1.6, "{carry}: {gains:?} {tens:?}");
         }
     }
 }

@@ -396,7 +396,7 @@ fn searches_order_as_brute_force(tasks: usize) {
                 progress: &on,
             };
             let exchanged = search.exchange(t.options.positions.expect("a number"), &[], 40, seed);
-            let first = exchanged.found.first().map(|f| (f.worth.degree, f.worth.value));
+            let first = exchanged.found.first().map(|f| (f.score.degree, f.score.value));
             let agrees = match (first, all.best()) {
                 (Some(found), Some(best)) => {
                     assert!(

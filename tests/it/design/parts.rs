@@ -262,13 +262,13 @@ fn what_no_search_writes_is_refused() {
         (
             |p| {
                 p.levels[0].best.found[0].sequence.swap(1, 2);
-                p.levels[0].best.found[0].worth.value = 0.001;
+                p.levels[0].best.found[0].score.value = 0.001;
             },
             "b: it lists ",
         ),
-        (|p| p.levels[0].best.found[0].worth.value = 0.001, "; evaluated again: "),
-        (|p| p.levels[0].best.found[0].worth.degree = 0, "judged again: "),
-        (|p| p.levels[0].best.found[0].worth.violation = 1.0, "a constraint that is not kept"),
+        (|p| p.levels[0].best.found[0].score.value = 0.001, "; evaluated again: "),
+        (|p| p.levels[0].best.found[0].score.degree = 0, "judged again: "),
+        (|p| p.levels[0].best.found[0].score.violation = 1.0, "a constraint that is not kept"),
         (|p| p.levels[0].best.found[0].seconds -= 1.0, " s in all; evaluated again: "),
         (|p| p.levels[0].best.found[0].sequence.truncate(3), "3 positions; expected 4"),
         (|p| p.levels[0].best.found[0].sequence[3].candidate = 9999, "candidate 9999; expected 0 to 5"),

@@ -180,7 +180,7 @@ fn turned_schemes_are_equally_good() {
     let (one, six) = (of(&rows.symmetry(&|_, _| true)), of(&orbits));
     assert_eq!(one.examined * 6, six.examined);
     assert_eq!(one.ties.total(24), six.ties.total(4));
-    let ratio = six.found[0].worth.value / one.found[0].worth.value;
+    let ratio = six.found[0].score.value / one.found[0].score.value;
     assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
 }
 

@@ -202,7 +202,7 @@ fn turned_schemes_are_equally_good() {
             let symmetry = rows.symmetry(&|i, j| (i < 3) == (j < 3));
             orders.push(symmetry.order);
             let (some, all) = (of(&symmetry), of(&CandidateSymmetry::none(24)));
-            let best = |of: &Best| of.found.first().map(|f| f.worth.value);
+            let best = |of: &Best| of.found.first().map(|f| f.score.value);
             match best(&some).zip(best(&all)) {
                 Some((some, all)) => {
                     assert!((some / all - 1.0).abs() < 1e-7, "{terms} {carry}: {some} {all}")

@@ -188,8 +188,8 @@ impl Bench {
         let mut markov = [0.0; 3].map(|_: f64| self.markov.0 * DPH * random.normal());
         let (mut t, mut out) = (0.0, Vec::new());
         for (p, (name, angles, dwell)) in self.positions.iter().enumerate() {
-            let aim = attitude(angles);
-            let turn = vector(&multiply(&conjugate(&computed), &aim));
+            let target = attitude(angles);
+            let turn = vector(&multiply(&conjugate(&computed), &target));
             let angle = turn.iter().map(|x| x * x).sum::<f64>().sqrt();
             if p > 0 {
                 match self.slew_deg_s {
@@ -216,13 +216,15 @@ impl Bench {
                     }
                     _ => {
                         q = match &self.carry {
-                            AtOnce::Inertial => multiply(&multiply(&q, &conjugate(&computed)), &aim),
-                            AtOnce::Platform => multiply(&aim, &multiply(&conjugate(&computed), &q)),
-                            AtOnce::Reset(psi) => multiply(&of_vector(&turned(&aim, &psi[p - 1])), &aim),
+                            AtOnce::Inertial => multiply(&multiply(&q, &conjugate(&computed)), &target),
+                            AtOnce::Platform => multiply(&target, &multiply(&conjugate(&computed), &q)),
+                            AtOnce::Reset(psi) => {
+                                multiply(&of_vector(&turned(&target, &psi[p - 1])), &target)
+                            }
                         }
                     }
                 }
-                computed = aim;
+                computed = target;
             }
             let steps = (dwell / self.step_s).round() as usize;
             for _ in 0..steps {

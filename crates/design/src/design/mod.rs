@@ -44,6 +44,6 @@ pub(crate) use run::winner::{half_turn, under};
 pub use search::best::Best;
 pub use search::constraints::Constraints;
 pub use search::progress::Progress;
-pub use search::score::{Scored, Worth};
+pub use search::score::{Score, Scored};
 pub use search::scoring::SequenceSearch;
 pub use search::ties::Ties;

@@ -565,7 +565,7 @@ mod tests {
     use super::*;
 
     /// Regression of degree two on [-1, 1]: `A_i = f f^T`, f = (1, x, x^2), at `points` points.
-    fn quadratic(points: usize, nuisance: usize, aim: Objective) -> Additive {
+    fn quadratic(points: usize, nuisance: usize, objective: Objective) -> Additive {
         let at = |i: usize| -> DMatrix<f64> {
             let x = 2.0 * i as f64 / (points - 1) as f64 - 1.0;
             // unknowns that count come last
@@ -577,7 +577,7 @@ mod tests {
             &f * f.transpose()
         };
         let candidates = (0..points).map(at).collect();
-        Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, objective: aim }
+        Additive { candidates, prior: DMatrix::zeros(3, 3), nuisance, objective }
     }
 
     /// Pukelsheim, Optimal Design of Experiments, 9.5 and 9.12: weights at -1, 0, 1 of the D-, A- and
@@ -596,12 +596,16 @@ mod tests {
             (2, Objective::Largest(square, vec![0.0]), [0.25, 0.5, 0.25]),
         ];
         for points in [3, 41, 401] {
-            for (nuisance, aim, expected) in &cases {
-                let problem = quadratic(points, *nuisance, aim.clone());
+            for (nuisance, objective, expected) in &cases {
+                let problem = quadratic(points, *nuisance, objective.clone());
                 let found = weigh(&problem, &|| true).expect("weights");
-                assert!(found.attained / found.bound < 1.0 + 1e-6, "{points} {aim:?}: {found:?}");
+                assert!(found.attained / found.bound < 1.0 + 1e-6, "{points} {objective:?}: {found:?}");
                 for (i, w) in [(0, expected[0]), (points / 2, expected[1]), (points - 1, expected[2])] {
-                    assert!((found.weights[i] - w).abs() < 2e-3, "{points} {aim:?}: {:?}", found.weights);
+                    assert!(
+                        (found.weights[i] - w).abs() < 2e-3,
+                        "{points} {objective:?}: {:?}",
+                        found.weights
+                    );
                 }
             }
         }
@@ -624,7 +628,7 @@ mod tests {
     #[test]
     fn slopes_are_differences() {
         let units = DMatrix::identity(3, 3);
-        let aims = [
+        let objectives = [
             (0, Objective::Volume),
             (1, Objective::Volume),
             (0, Objective::Mean(units.clone())),
@@ -632,13 +636,13 @@ mod tests {
             (1, Objective::Least),
             (0, Objective::Largest(units, vec![0.1, 0.0, 0.3])),
         ];
-        for (nuisance, aim) in aims {
-            let mut problem = quadratic(5, 0, aim.clone());
+        for (nuisance, objective) in objectives {
+            let mut problem = quadratic(5, 0, objective.clone());
             problem.nuisance = nuisance;
             let weighing = WeightProblem::new(&problem, (0..5).collect(), 0.0);
             let w = [0.3, 0.1, 0.25, 0.15, 0.2];
             let scale = weighing.objective(&w).expect("regular");
-            let s = if aim == Objective::Least { 0.5 / scale } else { 2.0 * scale };
+            let s = if objective == Objective::Least { 0.5 / scale } else { 2.0 * scale };
             let (tau, unit) = (7.0, 1.3);
             let root = weighing.at(&w, s, tau, unit).expect("inside").root;
             let (gradient, hessian) = whole(weighing.slopes(&root, &w, tau, unit).expect("inside"));
@@ -658,7 +662,7 @@ mod tests {
                 let slope = (value(&up) - value(&down)) / (2.0 * h);
                 assert!(
                     (slope - gradient[k]).abs() < 1e-5 * (1.0 + slope.abs()),
-                    "{aim:?} {k}: {slope} {}",
+                    "{objective:?} {k}: {slope} {}",
                     gradient[k]
                 );
                 let at = |(w, s): &([f64; 5], f64)| {
@@ -670,7 +674,7 @@ mod tests {
                     let told = hessian[(k, j)];
                     assert!(
                         (bend - told).abs() < 1e-4 * (1.0 + bend.abs()),
-                        "{aim:?} {k} {j}: {bend} {told}"
+                        "{objective:?} {k} {j}: {bend} {told}"
                     );
                 }
             }

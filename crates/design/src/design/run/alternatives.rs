@@ -133,7 +133,7 @@ impl AlternativeSearch<'_> {
             }
             let value = there.of_sequence(&nearest.sequence, &prepared.task.criterion);
             let mut scored = nearest.clone();
-            scored.worth.value = value;
+            scored.score.value = value;
             let found = prepared.task.all_found(&there, &[scored])?;
             Ok(found.into_iter().next().filter(|f| f.requirements.all_met()))
         };

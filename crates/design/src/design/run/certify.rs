@@ -49,7 +49,7 @@ impl Task<'_> {
 
     /// Criterion of a scheme with its rounding tolerance, for its information as evaluated.
     pub(crate) fn value(&self, evaluator: &Evaluator, of: &Scored) -> CriterionValue {
-        CriterionValue::new(of.worth.value, self.at_most(evaluator, of, None))
+        CriterionValue::new(of.score.value, self.at_most(evaluator, of, None))
     }
 
     /// Criterion with its rounding tolerance, for the information as it is bounded over all attitudes:
@@ -57,7 +57,7 @@ impl Task<'_> {
     pub(crate) fn value_among_all(&self, evaluator: &Evaluator, of: &Scored) -> CriterionValue {
         let attitudes = |stop: &Stop| (stop.candidate, &self.candidates.attitudes[stop.candidate]);
         let errors = evaluator.errors_of(of.sequence.iter().map(attitudes));
-        CriterionValue::new(of.worth.value, self.at_most(evaluator, of, Some(&errors)))
+        CriterionValue::new(of.score.value, self.at_most(evaluator, of, Some(&errors)))
     }
 
     /// Upper bound on the criterion of a scheme; `None` for total uncertainties, whose rounding is

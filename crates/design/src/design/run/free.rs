@@ -193,7 +193,7 @@ impl Free {
         }
         let mut best = search.exchange(k, &task.sequences_of(&self.starts), 0, task.options.seed);
         let better = |(degree, least): (usize, f64)| {
-            best.found.first().is_some_and(|f| f.worth.degree <= degree && f.worth.value <= least)
+            best.found.first().is_some_and(|f| f.score.degree <= degree && f.score.value <= least)
         };
         if best.complete && self.cardinal.is_some_and(|cardinal| !better(cardinal)) {
             // no free scheme found beats the bound on the cardinal attitudes: search these as without free
@@ -217,7 +217,7 @@ fn unlike(found: &[Scored]) -> Vec<&Scored> {
     let mut out: Vec<&Scored> = Vec::new();
     for scored in found {
         let alike = |last: &&Scored| {
-            last.worth.degree == scored.worth.degree && scored.worth.value <= last.worth.value * (1.0 + ALIKE)
+            last.score.degree == scored.score.degree && scored.score.value <= last.score.value * (1.0 + ALIKE)
         };
         if !out.last().is_some_and(alike) {
             out.push(scored);

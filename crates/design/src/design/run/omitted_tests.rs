@@ -72,7 +72,7 @@ impl Small {
 
     /// Worst degree and criterion of a sequence, by its whole answer; `None` where a coefficient is not
     /// observable.
-    fn worth(&self, sequence: &[usize]) -> Option<(usize, f64)> {
+    fn score(&self, sequence: &[usize]) -> Option<(usize, f64)> {
         let scheme = self.scheme(sequence);
         let platform = Platform::new(scheme.clone()).expect("a platform");
         let verdicts = judge(&platform, 1).expect("verdicts");
@@ -121,11 +121,11 @@ impl Small {
         [of(sigmas), of(biases)]
     }
 
-    /// Best sequence by `worth` among those for which `allowed` is true.
+    /// Best sequence by `score` among those for which `allowed` is true.
     fn brute_force(&self, allowed: impl Fn(&[usize]) -> bool) -> Option<(usize, f64)> {
         let all = self.sequences();
-        let worths = all.iter().filter(|s| allowed(s)).filter_map(|s| self.worth(s));
-        worths.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
+        let scores = all.iter().filter(|s| allowed(s)).filter_map(|s| self.score(s));
+        scores.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
     }
 }
 
@@ -191,7 +191,7 @@ fn benched(count: usize, seed: u64) -> [usize; 2] {
         let other = design(&small.base, &without, &small.options, &|_| true).expect("a scheme");
         let index = |name: &String| small.options.candidates.names.iter().position(|n| n == name);
         let sequence: Option<Vec<usize>> = other.found[0].positions.iter().map(index).collect();
-        let total = small.worth(&sequence.expect("candidates"));
+        let total = small.score(&sequence.expect("candidates"));
         counts[1] += usize::from(total.is_none_or(|t| t.0 == degree && t.1 > value * (1.0 + 1e-6)));
     }
     counts
@@ -211,7 +211,7 @@ fn check_front(small: &Small, found: &Design, task: usize) {
     for p in &found.bias_front {
         let sequence: Option<Vec<usize>> = p.positions.iter().map(index).collect();
         let sequence = sequence.expect("candidates");
-        let [sigma, total] = [&without, small].map(|s| s.worth(&sequence).expect("observable, and met").1);
+        let [sigma, total] = [&without, small].map(|s| s.score(&sequence).expect("observable, and met").1);
         assert!((p.sigma / sigma - 1.0).abs() < 1e-6, "task {task}: {p:?} {sigma}");
         assert!((p.total / total - 1.0).abs() < 1e-6, "task {task}: {p:?} {total}");
         assert!(p.total > found.found[0].value * (1.0 - 1e-9), "task {task}: {p:?}");
@@ -224,7 +224,7 @@ fn check_front(small: &Small, found: &Design, task: usize) {
     let mut all: Vec<[f64; 2]> = small
         .sequences()
         .iter()
-        .filter(|s| small.worth(s).is_some_and(|w| w.0 == found.found[0].worst_degree))
+        .filter(|s| small.score(s).is_some_and(|w| w.0 == found.found[0].worst_degree))
         .map(|s| small.sigma_and_bias(s))
         .collect();
     all.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));

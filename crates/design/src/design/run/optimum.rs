@@ -281,7 +281,7 @@ fn blocks(
         if !best.complete || !progress(now) {
             return Err(DesignError::Interrupted);
         }
-        let found = best.found.first().filter(|s| s.worth.degree == degree).map(|s| s.worth.value);
+        let found = best.found.first().filter(|s| s.score.degree == degree).map(|s| s.score.value);
         // excluded sequences are above the best, and sequences lost to rounding are unknown
         let hidden = best.excluded > 0 || best.lost > 0;
         let above = |value: f64| least + ROOM * (value.min(CAP * least) - least);

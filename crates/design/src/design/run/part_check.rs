@@ -131,7 +131,7 @@ impl<'a> WholeSearch<'a> {
         }
         let order = self.prepared.task.symmetry.order;
         let images = if self.search.evaluator.ordered() { 1 } else { order };
-        let first = best.found.first().map(|f| (f.worth.degree, f.worth.value));
+        let first = best.found.first().map(|f| (f.score.degree, f.score.value));
         let ties = best.ties.first();
         let equal = ties.map(|(degree, value, _)| (degree, value)) == first || keep == 0;
         if !(equal && best.ties.are_tidy(images) && ties.is_none_or(|(_, _, count)| count <= valid)) {
@@ -198,22 +198,22 @@ impl<'a> WholeSearch<'a> {
             SearchLevel::Degree(degree, sets) => Some(*degree).filter(|_| sets.contains(&set)),
             SearchLevel::Any => degree,
         };
-        let worth = &scored.worth;
-        if degree != expected || degree != Some(worth.degree) {
+        let score = &scored.score;
+        if degree != expected || degree != Some(score.degree) {
             let again = degree.map_or_else(|| "none".into(), |d| d.to_string());
-            return Some(format!("worst degree {}; judged again: {again}", worth.degree));
+            return Some(format!("worst degree {}; judged again: {again}", score.degree));
         }
         let state = evaluator.state_of(sequence);
         let mut root = Vec::new();
         let value = evaluator.value(&state, search.criterion, &mut root);
-        if value.to_bits() != worth.value.to_bits() {
-            return Some(format!("criterion {}; evaluated again: {value}", worth.value));
+        if value.to_bits() != score.value.to_bits() {
+            return Some(format!("criterion {}; evaluated again: {value}", score.value));
         }
         if state.seconds.to_bits() != scored.seconds.to_bits() {
             return Some(format!("{} s in all; evaluated again: {} s", scored.seconds, state.seconds));
         }
         let violation = search.constraints.violation(evaluator, sequence, &state, &mut root);
-        let kept = worth.violation == 0.0 && violation == 0.0;
+        let kept = score.violation == 0.0 && violation == 0.0;
         (!kept).then(|| "a constraint that is not kept".into())
     }
 

@@ -134,7 +134,7 @@ impl<'a> PreparedSearch<'a> {
             let exchanged = exchanged();
             let near = |f: &Scored| excess(task.value(&self.evaluator, f).at_most, bound.value);
             let enough = |f: &Scored| {
-                options.within.is_none_or(|within| f.worth.degree == search.floor && near(f) < within)
+                options.within.is_none_or(|within| f.score.degree == search.floor && near(f) < within)
             };
             if !exchanged.complete || exchanged.found.first().is_some_and(enough) {
                 return (exchanged, None);

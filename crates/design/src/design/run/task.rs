@@ -431,7 +431,7 @@ impl<'a> Task<'a> {
         let attitudes: Vec<Euler> =
             scored.sequence.iter().map(|s| self.candidates.attitudes[s.candidate].clone()).collect();
         let names = scored.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
-        self.attained(self.judged(evaluator, &scored.sequence, attitudes, names, scored.worth.value)?)
+        self.attained(self.judged(evaluator, &scored.sequence, attitudes, names, scored.score.value)?)
     }
 
     /// Scored sequences confirmed by the exact verdict, as schemes.
@@ -668,7 +668,7 @@ impl<'a> Task<'a> {
         let mut names = Candidates::default();
         attitudes.iter().for_each(|a| names.add(a.clone()));
         let found = self.judged(&there, &path, attitudes, names.names, value)?;
-        let found = found.filter(|f| f.worst_degree <= best.worth.degree);
+        let found = found.filter(|f| f.worst_degree <= best.score.degree);
         self.attained(found.map(|f| Found { refined: true, ..f }))
     }
 

@@ -38,12 +38,12 @@ impl Task<'_> {
             return (Vec::new(), false);
         };
         // only schemes of the smallest worst degree are listed
-        let same = |s: &&Scored| s.worth.degree == first.worth.degree;
+        let same = |s: &&Scored| s.score.degree == first.score.degree;
         let every = search.few(&self.symmetry, k, MOST).map(|all| {
             let mut trial = Trial::new(evaluator);
             let start = evaluator.start();
-            let scored = all.into_iter().map(|s| search.worth_behind((&start, 0), &s, &mut trial));
-            let valid = scored.filter(|s| s.worth.is_valid()).filter(|s| same(&s));
+            let scored = all.into_iter().map(|s| search.score_behind((&start, 0), &s, &mut trial));
+            let valid = scored.filter(|s| s.score.is_valid()).filter(|s| same(&s));
             valid.map(|s| s.sequence).collect::<Vec<_>>()
         });
         let all = every.is_some();

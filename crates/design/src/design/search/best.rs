@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::design::search::score::{Scored, Worth, before};
+use crate::design::search::score::{Score, Scored, before};
 use crate::design::search::ties::{TIE, Ties};
 
 /// Best sequences, best first, and the front of time against the criterion.
@@ -28,31 +28,31 @@ pub struct Best {
 
 impl Best {
     /// True if a sequence would be kept.
-    pub(crate) fn wants(&self, keep: usize, worth: &Worth, seconds: f64) -> bool {
-        worth.is_valid()
+    pub(crate) fn wants(&self, keep: usize, score: &Score, seconds: f64) -> bool {
+        score.is_valid()
             && (self.found.len() < keep
-                || self.found.last().is_some_and(|last| !last.worth.better_than(worth))
-                || self.is_on_front(worth, seconds))
+                || self.found.last().is_some_and(|last| !last.score.better_than(score))
+                || self.is_on_front(score, seconds))
     }
 
-    fn is_on_front(&self, worth: &Worth, seconds: f64) -> bool {
-        let degree = self.front.first().map_or(usize::MAX, |f| f.worth.degree);
-        worth.degree < degree
-            || worth.degree == degree
-                && !self.front.iter().any(|f| f.seconds <= seconds && f.worth.value <= worth.value)
+    fn is_on_front(&self, score: &Score, seconds: f64) -> bool {
+        let degree = self.front.first().map_or(usize::MAX, |f| f.score.degree);
+        score.degree < degree
+            || score.degree == degree
+                && !self.front.iter().any(|f| f.seconds <= seconds && f.score.value <= score.value)
     }
 
     /// True if an equal sequence on the front is later in lexicographic order. The new one replaces it,
     /// so the front does not depend on the order of the search.
     fn is_before_its_equal(&self, new: &Scored) -> bool {
         let equal = |f: &&Scored| {
-            f.worth.degree == new.worth.degree && f.seconds == new.seconds && f.worth.value == new.worth.value
+            f.score.degree == new.score.degree && f.seconds == new.seconds && f.score.value == new.score.value
         };
         self.front.iter().find(equal).is_some_and(|f| new.sequence < f.sequence)
     }
 
     pub(crate) fn add(&mut self, keep: usize, new: Scored) {
-        if !new.worth.is_valid() {
+        if !new.score.is_valid() {
             return;
         }
         self.add_to_front(&new);
@@ -66,10 +66,10 @@ impl Best {
     /// Adds a sequence to the front unless another of no larger degree takes no more time and has no
     /// larger criterion; removes those that it beats.
     fn add_to_front(&mut self, new: &Scored) {
-        if self.is_on_front(&new.worth, new.seconds) || self.is_before_its_equal(new) {
+        if self.is_on_front(&new.score, new.seconds) || self.is_before_its_equal(new) {
             let beaten = |f: &Scored| {
-                f.worth.degree > new.worth.degree
-                    || f.seconds >= new.seconds && f.worth.value >= new.worth.value
+                f.score.degree > new.score.degree
+                    || f.seconds >= new.seconds && f.score.value >= new.score.value
             };
             self.front.retain(|f| !beaten(f));
             let place = self.front.partition_point(|f| f.seconds < new.seconds);
@@ -81,7 +81,7 @@ impl Best {
     /// among the best `keep`, or as a tie of the first. `known` were found before, with the same worst
     /// degree.
     pub(crate) fn limit(&self, keep: usize, known: &Self) -> f64 {
-        let value = |of: &Self, place: usize| of.found.get(place).map_or(f64::INFINITY, |s| s.worth.value);
+        let value = |of: &Self, place: usize| of.found.get(place).map_or(f64::INFINITY, |s| s.score.value);
         let least = |place: usize| value(self, place).min(value(known, place));
         least(keep - 1).max(least(0) * (1.0 + TIE))
     }

@@ -6,7 +6,7 @@ use crate::design::measure::evaluator::SequenceState;
 use crate::design::measure::stop::Stop;
 use crate::design::search::best::Best;
 use crate::design::search::progress::{Meter, PATIENCE};
-use crate::design::search::score::{Scored, Worth};
+use crate::design::search::score::{Score, Scored};
 use crate::design::search::scoring::{SequenceSearch, Trial};
 
 /// Largest number of rounds of one exchange.
@@ -92,7 +92,7 @@ impl<'a> Exchange<'a> {
             search,
             meter,
             firsts,
-            held: Scored { worth: Worth::NONE, seconds: 0.0, sequence: now.clone() },
+            held: Scored { score: Score::NONE, seconds: 0.0, sequence: now.clone() },
             now,
             best: Best::default(),
             trial: Trial::new(search.evaluator),
@@ -102,8 +102,8 @@ impl<'a> Exchange<'a> {
     /// Exchanges and swaps the `k` places until neither helps.
     fn improve(&mut self, k: usize) {
         for _ in 0..ROUNDS {
-            let round = self.held.worth;
-            if !self.replace(k) || !self.swap(k) || !self.held.worth.better_than(&round) {
+            let round = self.held.score;
+            if !self.replace(k) || !self.swap(k) || !self.held.score.better_than(&round) {
                 break;
             }
         }
@@ -155,20 +155,20 @@ impl<'a> Exchange<'a> {
     fn try_out(&mut self, before: (&SequenceState, usize)) -> bool {
         let (search, keep) = (self.search, self.search.keep);
         self.best.examined += 1;
-        let other = search.worth_behind(before, &self.now, &mut self.trial);
-        if self.firsts.is_some() && self.best.wants(keep, &other.worth, other.seconds) {
+        let other = search.score_behind(before, &self.now, &mut self.trial);
+        if self.firsts.is_some() && self.best.wants(keep, &other.score, other.seconds) {
             let mut other = search.judged(other.clone());
             search.evaluator.tidy(&mut other.sequence);
             self.best.add(keep, other);
         }
-        if other.worth.better_than(&self.held.worth) {
+        if other.score.better_than(&self.held.score) {
             let other = search.judged(other);
-            if other.worth.better_than(&self.held.worth) {
+            if other.score.better_than(&self.held.score) {
                 self.held = other;
             }
         }
         !self.best.examined.is_multiple_of(PATIENCE)
-            || self.meter.report(0, PATIENCE, Some(&self.held).filter(|h| h.worth.is_valid()))
+            || self.meter.report(0, PATIENCE, Some(&self.held).filter(|h| h.score.is_valid()))
     }
 
     /// Kept sequences with the best one of this exchange.

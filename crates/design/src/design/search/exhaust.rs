@@ -13,7 +13,7 @@ use crate::design::observable::symmetry::CandidateSymmetry;
 use crate::design::search::best::Best;
 use crate::design::search::constraints::beyond;
 use crate::design::search::progress::{Meter, PATIENCE};
-use crate::design::search::score::{Scored, Worth};
+use crate::design::search::score::{Score, Scored};
 use crate::design::search::scoring::{SequenceSearch, candidates};
 use crate::design::search::screen::{Scratch, Screen};
 
@@ -116,15 +116,15 @@ impl<'a> Traversal<'a> {
         if self.best.examined.is_multiple_of(PATIENCE) {
             self.stopped = !self.meter.report(0, PATIENCE, self.best.found.first());
         }
-        let worth = Worth { violation: 0.0, degree, value };
-        if !worth.is_valid() {
+        let score = Score { violation: 0.0, degree, value };
+        if !score.is_valid() {
             self.best.lost += 1;
             return;
         }
         let seconds = state.seconds;
         let wanted =
-            |best: &Best, worth: &Worth| [best.ties.wants(worth), best.wants(search.keep, worth, seconds)];
-        if wanted(&self.best, &worth) == [false; 2] {
+            |best: &Best, score: &Score| [best.ties.wants(score), best.wants(search.keep, score, seconds)];
+        if wanted(&self.best, &score) == [false; 2] {
             return;
         }
         // the total uncertainty, which is at least the sigma
@@ -132,17 +132,17 @@ impl<'a> Traversal<'a> {
             search.evaluator.extend_errors(&behind[depth - 1], self.sequence[depth - 1], state);
             value = search.evaluator.by_root(state, search.criterion, &self.root, &mut self.variances, true);
         }
-        let worth = Worth { value, ..worth };
-        let [ties, kept] = wanted(&self.best, &worth);
+        let score = Score { value, ..score };
+        let [ties, kept] = wanted(&self.best, &score);
         if !ties && !kept {
             return;
         }
         if search.constraints.violation(search.evaluator, &self.sequence, state, &mut self.root) > 0.0 {
             return;
         }
-        self.best.ties.add(&worth, images, 1);
+        self.best.ties.add(&score, images, 1);
         if kept {
-            let scored = Scored { worth, seconds, sequence: self.sequence.clone() };
+            let scored = Scored { score, seconds, sequence: self.sequence.clone() };
             self.best.add(search.keep, scored);
         }
     }
@@ -269,7 +269,7 @@ impl SequenceSearch<'_> {
         for mut scored in exchanged.found.into_iter().chain(exchanged.front) {
             // degree as in the sets that are searched
             if let Some(degree) = self.worst(self.rows.degrees(&candidates(&scored.sequence))) {
-                scored.worth.degree = degree;
+                scored.score.degree = degree;
                 known.entry(degree).or_default().add(self.keep, scored);
             }
         }

@@ -64,7 +64,7 @@ impl<'a> Meter<'a> {
 
     /// Adds to the work done; false if the search must stop.
     pub(crate) fn report(&self, parts: u64, examined: u64, best: Option<&Scored>) -> bool {
-        let value = best.map_or(f64::INFINITY, |b| b.worth.value);
+        let value = best.map_or(f64::INFINITY, |b| b.score.value);
         // a poisoned lock follows from a panic that is reported already
         let best = self.best.lock().map_or(value, |mut b| {
             *b = b.min(value);

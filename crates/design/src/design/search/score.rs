@@ -7,7 +7,8 @@ use crate::design::measure::stop::Stop;
 
 /// Score of a sequence, better first: constraints kept, then a small worst degree, then a small criterion.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
-pub struct Worth {
+#[schemars(rename = "Worth")]
+pub struct Score {
     /// Violation of time limits, requirements and degree caps, dimensionless; 0 when kept.
     pub violation: f64,
     /// Largest observable degree of a required coefficient.
@@ -16,7 +17,7 @@ pub struct Worth {
     pub value: f64,
 }
 
-impl Worth {
+impl Score {
     pub(crate) const NONE: Self = Self { violation: f64::INFINITY, degree: usize::MAX, value: f64::INFINITY };
 
     fn key(&self) -> (f64, usize, f64) {
@@ -41,7 +42,8 @@ impl Worth {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scored {
     /// Score: constraints, worst degree and criterion.
-    pub worth: Worth,
+    #[serde(rename = "worth")]
+    pub score: Score,
     /// Total time of dwells and turns, in s.
     pub seconds: f64,
     /// Candidates of the sequence, in order, with the slew paths to them.
@@ -50,5 +52,5 @@ pub struct Scored {
 
 /// True if `a` comes before `b`: by score, ties in lexicographic order of the sequences.
 pub(crate) fn before(a: &Scored, b: &Scored) -> bool {
-    a.worth.order(&b.worth).then_with(|| a.sequence.cmp(&b.sequence)).is_lt()
+    a.score.order(&b.score).then_with(|| a.sequence.cmp(&b.sequence)).is_lt()
 }

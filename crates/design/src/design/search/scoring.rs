@@ -6,7 +6,7 @@ use crate::design::measure::stop::Stop;
 use crate::design::observable::rows::AttitudeRows;
 use crate::design::search::constraints::Constraints;
 use crate::design::search::progress::Progress;
-use crate::design::search::score::{Scored, Worth};
+use crate::design::search::score::{Score, Scored};
 
 /// Data that all searches share.
 pub struct SequenceSearch<'a> {
@@ -60,7 +60,7 @@ impl SequenceSearch<'_> {
 
     /// Score and time of a sequence from the state behind its first `known` positions; at least one position
     /// follows. Degrees are those of one field.
-    pub(crate) fn worth_behind(
+    pub(crate) fn score_behind(
         &self,
         (state, known): (&SequenceState, usize),
         sequence: &[Stop],
@@ -80,8 +80,8 @@ impl SequenceSearch<'_> {
         if degree.is_none() {
             violation += 1.0;
         }
-        let worth = Worth { violation, degree: degree.unwrap_or(usize::MAX), value };
-        Scored { worth, seconds: state.seconds, sequence: sequence.to_vec() }
+        let score = Score { violation, degree: degree.unwrap_or(usize::MAX), value };
+        Scored { score, seconds: state.seconds, sequence: sequence.to_vec() }
     }
 
     /// Score corrected where the exact verdict, of instantaneous repositioning, misses a coefficient
@@ -91,7 +91,7 @@ impl SequenceSearch<'_> {
             return scored;
         }
         let degrees = self.rows.likely_degrees(&candidates(&scored.sequence));
-        scored.worth.violation += degrees.iter().filter(|d| d.is_none()).count() as f64;
+        scored.score.violation += degrees.iter().filter(|d| d.is_none()).count() as f64;
         scored
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::design::search::score::Worth;
+use crate::design::search::score::Score;
 
 /// Relative difference of criteria below which sequences of equal worst degree tie.
 pub(crate) const TIE: f64 = 1e-6;
@@ -57,22 +57,22 @@ impl Ties {
     }
 
     /// True if a sequence with this score is as good as the best so far, or better.
-    pub(crate) fn wants(&self, worth: &Worth) -> bool {
+    pub(crate) fn wants(&self, score: &Score) -> bool {
         self.counts.is_empty()
-            || worth.degree < self.degree
-            || worth.degree == self.degree && worth.value <= self.limit()
+            || score.degree < self.degree
+            || score.degree == self.degree && score.value <= self.limit()
     }
 
     /// Adds `count` sequences with this score, each with `images` searched images.
-    pub(crate) fn add(&mut self, worth: &Worth, images: usize, count: u64) {
-        if !self.wants(worth) {
+    pub(crate) fn add(&mut self, score: &Score, images: usize, count: u64) {
+        if !self.wants(score) {
             return;
         }
-        if worth.degree != self.degree {
+        if score.degree != self.degree {
             self.counts.clear();
-            self.degree = worth.degree;
+            self.degree = score.degree;
         }
-        *self.counts.entry((worth.value.to_bits(), images)).or_default() += count;
+        *self.counts.entry((score.value.to_bits(), images)).or_default() += count;
         // criteria that do not tie with a better one are removed
         let limit = self.limit();
         while let Some(last) = self.counts.last_entry().filter(|e| f64::from_bits(e.key().0) > limit) {
@@ -101,7 +101,7 @@ impl Ties {
     pub(crate) fn merge(&mut self, other: Self) {
         for ((bits, images), count) in other.counts {
             let value = f64::from_bits(bits);
-            self.add(&Worth { violation: 0.0, degree: other.degree, value }, images, count);
+            self.add(&Score { violation: 0.0, degree: other.degree, value }, images, count);
         }
     }
 
