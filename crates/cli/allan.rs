@@ -55,11 +55,11 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     let interrupted = interrupt::flag()?;
     a.output.check_folder()?;
     let bar = Bar::start(a.output.target.quiet);
-    let going = |now| {
+    let progress = |now| {
         bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
-    let found = allan(&a.asked, open_record(&a.record)?, &Host { worker: None, going: &going })?;
+    let found = allan(&a.asked, open_record(&a.record)?, &Host { worker: None, progress: &progress })?;
     drop(bar);
     a.output.write_folder(&found, "allan.json", || allan_files(&found))?;
     if found.columns.iter().all(|c| c.explained) { Ok(()) } else { Err(Failure::check()) }

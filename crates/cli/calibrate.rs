@@ -85,7 +85,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.output.check_folder()?;
     a.asked.given = given;
     let bar = Bar::start(a.output.target.quiet);
-    let going = |now| {
+    let progress = |now| {
         bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
@@ -93,7 +93,7 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     let named = source.read()?;
     let records = records.iter().map(|path| open_record(path)).collect::<Result<Vec<_>, _>>()?;
     let before = a.before.as_deref().map(|path| read(path, "calibration")).transpose()?;
-    let host = Host { worker: None, going: &going };
+    let host = Host { worker: None, progress: &progress };
     let found = calibrate(&a.asked, named, records, before.as_ref(), &host)?;
     drop(bar);
     let acceptance = found.acceptance();

@@ -45,11 +45,11 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     a.asked.input.given = given;
     let input = a.asked.input.read_one(a.files.read()?)?;
     let bar = Bar::start(a.output.target.quiet);
-    let going = |now| {
+    let progress = |now| {
         bar.show(&now);
         true
     };
-    let evidence = crosscheck(&a.asked, &input, &Host { worker: None, going: &going });
+    let evidence = crosscheck(&a.asked, &input, &Host { worker: None, progress: &progress });
     drop(bar);
     let evidence = evidence?;
     a.output.write_folder(&evidence, "evidence.json", || crosscheck_files(&evidence))?;

@@ -123,12 +123,12 @@ pub(crate) fn run(a: &Arguments) -> Result<(), Failure> {
     };
     let bar = Bar::start(a.output.target.quiet);
     let interrupted = interrupt::flag()?;
-    let going = |now| {
+    let progress = |now| {
         bar.show(&now);
         !interrupted.load(Ordering::Relaxed)
     };
     let asked = Search { certificate: a.certificate.is_some(), ..a.asked.clone() };
-    let designed = design(&asked, &files, &Host { worker: None, going: &going });
+    let designed = design(&asked, &files, &Host { worker: None, progress: &progress });
     drop(bar);
     match designed? {
         Designed::Schemes(mut found) => {

@@ -110,12 +110,12 @@ fn on_path(name: impl AsRef<Path>) -> Option<PathBuf> {
 }
 
 /// Folder of the print that goes on, and the process group of its browser.
-static GOING: Mutex<Option<(PathBuf, Option<u32>)>> = Mutex::new(None);
+static RUNNING: Mutex<Option<(PathBuf, Option<u32>)>> = Mutex::new(None);
 
 /// Ends the browser of a print that goes on, with all its processes, and removes the folder.
 pub(crate) fn abandon() {
-    let going = GOING.lock().unwrap_or_else(PoisonError::into_inner).take();
-    let Some((folder, browser)) = going else { return };
+    let running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let Some((folder, browser)) = running else { return };
     browser.into_iter().for_each(end_group);
     for _ in 0..10 {
         // its processes may still write
@@ -160,7 +160,7 @@ pub(crate) fn print(browser: &Path, page: &[u8]) -> Result<Vec<u8>, Failure> {
 /// Prints within a time limit; the error is the reason.
 fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, String> {
     let folder = private_folder().map_err(|e| e.to_string())?;
-    *GOING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder.clone(), None));
+    *RUNNING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder.clone(), None));
     let _going = RunningPrint;
     let [html, pdf, profile] = ["review.html", "review.pdf", "profile"].map(|name| folder.join(name));
     fs::write(&html, page).map_err(|e| e.to_string())?;
@@ -185,7 +185,7 @@ fn within(browser: &Path, page: &[u8], limit: Duration) -> Result<Vec<u8>, Strin
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let child = command.spawn().map_err(|e| e.to_string())?;
-    *GOING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder, Some(child.id())));
+    *RUNNING.lock().unwrap_or_else(PoisonError::into_inner) = Some((folder, Some(child.id())));
     let status = ended(child, limit)?;
     let mut bytes = fs::read(&pdf).map_err(|_| format!("it ended with {status}"))?;
     if !bytes.starts_with(b"%PDF-") {

@@ -123,11 +123,11 @@ pub(crate) fn run(mut a: Arguments, given: Given) -> Result<(), Failure> {
     }
     let mut worker = a.engine.worker(a.target.quiet, Box::new(Vec::new))?;
     let bar = Bar::start(a.target.quiet);
-    let going = |now| {
+    let progress = |now| {
         bar.show(&now);
         true
     };
-    let mut host = Host { worker: worker.as_mut(), going: &going };
+    let mut host = Host { worker: worker.as_mut(), progress: &progress };
     let reviewed = report(&a.asked, read, &calibrations, &mut host)?;
     a.met.check(reviewed.requirements())?;
     bar.set_message("writing");

@@ -145,7 +145,7 @@ fn holds(seed: u64, with_report: bool) {
     // the engine of the page reads the same text
     let text = std::fs::read_to_string(&file).expect("the winner");
     let asked = object!({ "sources": [{ "name": "winner.toml", "text": text }] });
-    let page = call_json("compare", &asked.to_string(), &mut Host { worker: None, going: &|_| true })
+    let page = call_json("compare", &asked.to_string(), &mut Host { worker: None, progress: &|_| true })
         .expect("an answer");
     let page: Value = serde_json::from_str(&page.text).expect("JSON");
     assert_eq!(&page["schemes"][0], compared, "{name}");
@@ -355,7 +355,7 @@ fn uncertainties(text: &str, name: &str) -> Vec<Value> {
     let again = &json(&["compare", &format!("{winner}/winner.toml"), "--format", "json"])["schemes"][0];
     assert!(same(&found["worst_sigma_dph"], &again["worst"]["sigma_dph"]), "{name}: {found} {again}");
     let asked = object!({ "sources": [{ "name": "settling.toml", "text": text }] });
-    let page = call_json("compare", &asked.to_string(), &mut Host { worker: None, going: &|_| true });
+    let page = call_json("compare", &asked.to_string(), &mut Host { worker: None, progress: &|_| true });
     let page: Value = serde_json::from_str(&page.expect("an answer").text).expect("JSON");
     assert!(&page["schemes"][0] == compared, "{name}: the page");
     expected.iter().map(|q| q["sigma"].clone()).collect()

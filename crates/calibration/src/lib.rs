@@ -42,7 +42,7 @@ mod zstd_pages;
 
 /// Progress of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Going<'a> {
+pub enum CalibrationProgress<'a> {
     /// Samples of a record that were read.
     Reads {
         /// Name of the record.

@@ -1,7 +1,7 @@
 //! Noise of sensors from a static record.
 
 use clap::Args;
-use obsdeg_calibration::Going;
+use obsdeg_calibration::CalibrationProgress;
 use obsdeg_calibration::noise::{NoiseError, NoiseOptions, SensorNoiseReport, sensor_noise};
 use obsdeg_calibration::record::{Record, STANDARD_GRAVITY};
 use obsdeg_report::{File, Format, ReportError, TerminalLayout, sensor_noise_figures, written};
@@ -53,8 +53,8 @@ pub fn allan(a: &Allan, record: Record, host: &Host<'_>) -> Result<SensorNoiseRe
     }
     let options =
         NoiseOptions { columns: a.column.clone(), confidence: a.confidence, gravity_m_s2: a.gravity };
-    let going = |now: Going<'_>| (host.going)(now.into());
-    sensor_noise(record, &options, &going).map_err(|e| match e {
+    let progress = |now: CalibrationProgress<'_>| (host.progress)(now.into());
+    sensor_noise(record, &options, &progress).map_err(|e| match e {
         NoiseError::Interrupted => Problem { kind: Kind::Interrupted, ..Problem::input("interrupted") },
         e => Problem::input(e.to_string()),
     })

@@ -268,7 +268,7 @@ pub fn analyze(options: &Analyze, read: &[NamedInput], host: &mut Host<'_>) -> R
     let mut judged = Vec::with_capacity(read.len());
     for (i, (name, input)) in read.iter().enumerate() {
         let what = if name.is_empty() { "judging".into() } else { format!("judging {name}") };
-        if several && !(host.going)(Now::of(what, i as u64, read.len() as u64)) {
+        if several && !(host.progress)(Now::of(what, i as u64, read.len() as u64)) {
             return Err(Problem::interrupted());
         }
         // errors in a model already have a place in its file

@@ -8,8 +8,8 @@ use obsdeg_calibration::platform::{RecordsRead, STANDARD_GRAVITY, read_records};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::system::SystemFinding;
 use obsdeg_calibration::{
-    Before, Calibration, Going, Options, SystemCalibration, SystemCalibrationError, SystemCalibrationOptions,
-    calibrate_system,
+    Before, Calibration, CalibrationProgress, Options, SystemCalibration, SystemCalibrationError,
+    SystemCalibrationOptions, calibrate_system,
 };
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::ranges;
@@ -290,7 +290,7 @@ pub fn calibrate(
         }
     }
     check_whole("--starts", a.starts, &SOME_STARTS)?;
-    let going = |now: Going<'_>| (host.going)(now.into());
+    let progress = |now: CalibrationProgress<'_>| (host.progress)(now.into());
     a.given.concern([&named])?;
     let mut scheme = match named.1 {
         Input::Scheme(scheme) => scheme,
@@ -299,7 +299,7 @@ pub fn calibrate(
                 "--dry-run shows how the records of a scheme are read; expected a scheme, found a model",
             ));
         }
-        Input::Model(file) => return of_model(a, &file, records, before, &going),
+        Input::Model(file) => return of_model(a, &file, records, before, &progress),
     };
     a.assumptions.apply(&mut scheme);
     a.judged.concern(std::iter::once(&*scheme))?;
@@ -311,10 +311,10 @@ pub fn calibrate(
         seed: a.seed,
     };
     if a.dry_run {
-        let read = read_records(&scheme, &a.conditions(&scheme), records, &options, &going)?;
+        let read = read_records(&scheme, &a.conditions(&scheme), records, &options, &progress)?;
         return Ok(Calibrated::Read(Box::new(read)));
     }
-    let found = obsdeg_calibration::calibrate(&scheme, &a.conditions(&scheme), records, &options, &going)?;
+    let found = obsdeg_calibration::calibrate(&scheme, &a.conditions(&scheme), records, &options, &progress)?;
     Ok(Calibrated::Platform(Box::new(found)))
 }
 
@@ -324,7 +324,7 @@ fn of_model(
     file: &ModelWithText,
     records: Vec<Record>,
     before: Option<&Source>,
-    going: &dyn Fn(Going<'_>) -> bool,
+    progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
 ) -> Result<Calibrated, Problem> {
     let found = records.len();
     let Ok([record]) = <[Record; 1]>::try_from(records) else {
@@ -336,7 +336,7 @@ fn of_model(
         prior: before.map(|p| prior(p, "obsdeg.system-calibration", "model")).transpose()?,
         seed: a.seed,
     };
-    let found = calibrate_system(&file.model, record, &options, going).map_err(|e| match e {
+    let found = calibrate_system(&file.model, record, &options, progress).map_err(|e| match e {
         SystemCalibrationError::Model(e) => file.wrong(&e),
         SystemCalibrationError::Interrupted => {
             Problem { kind: Kind::Interrupted, ..Problem::input("interrupted") }

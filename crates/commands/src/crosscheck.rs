@@ -132,8 +132,9 @@ pub fn crosscheck(options: &Crosscheck, input: &Input, host: &Host<'_>) -> Resul
                 FilterChange { carry: options.filter_carry, latitude: options.filter_latitude, dropped };
             let runs = options.runs as usize;
             let settings = CrossCheckOptions { runs, seed: options.seed, filter };
-            let going = |done: usize| (host.going)(Now::of("Monte Carlo", done as u64, runs as u64));
-            let evidence = obsdeg_evidence::crosscheck::crosscheck(scheme, &conditions, &settings, &going)?;
+            let progress = |done: usize| (host.progress)(Now::of("Monte Carlo", done as u64, runs as u64));
+            let evidence =
+                obsdeg_evidence::crosscheck::crosscheck(scheme, &conditions, &settings, &progress)?;
             Ok(Evidence::Scheme(Box::new(evidence)))
         }
         Input::Model(file) => {

@@ -362,10 +362,10 @@ pub fn design(a: &Search, files: &SearchFiles, host: &Host<'_>) -> Result<Design
     }
     let parts = files.merge.iter().map(|part| Ok((part.name.clone(), read_part(part)?)));
     let parts: Vec<(String, Part)> = parts.collect::<Result<_, Problem>>()?;
-    let progress = |now: Progress| (host.going)(now.into());
+    let progress = |now: Progress| (host.progress)(now.into());
     if let Some(number) = a.part {
-        let going_on = files.resume.as_ref().map(read_part).transpose()?;
-        let mut done = design_part(&base, &conditions, &options, number, going_on, &progress)?;
+        let resumed = files.resume.as_ref().map(read_part).transpose()?;
+        let mut done = design_part(&base, &conditions, &options, number, resumed, &progress)?;
         done.asked = Some(Asked::of(a, files)?);
         return Ok(Designed::Part(Box::new(done.sealed())));
     }
@@ -712,7 +712,8 @@ fn fewest_positions_of_slew_sequence(
         most_turn_deg: a.max_turn.unwrap_or(90.0),
         seed: options.seed,
     };
-    let found = shortest_slew_sequence(&base, &options, &|| (host.going)(Now::of("searching walks", 0, 1)))?;
+    let found =
+        shortest_slew_sequence(&base, &options, &|| (host.progress)(Now::of("searching walks", 0, 1)))?;
     Ok(Designed::SlewSequence(Box::new(SearchedSlewSequence { found, base })))
 }
 

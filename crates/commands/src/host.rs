@@ -1,6 +1,6 @@
 //! Caller of a command: the resources that an answer may use, and the receiver of its progress.
 
-use obsdeg_calibration::Going;
+use obsdeg_calibration::CalibrationProgress;
 use obsdeg_design::design::Progress;
 use obsdeg_symbolic::Worker;
 use serde::Serialize;
@@ -39,11 +39,11 @@ impl From<Progress> for Now {
     }
 }
 
-impl From<Going<'_>> for Now {
-    fn from(going: Going<'_>) -> Self {
-        let (what, done) = match going {
-            Going::Reads { record, samples } => (format!("reading {record}"), samples),
-            Going::Passes(passes) => ("calibrating, linearisations".into(), passes),
+impl From<CalibrationProgress<'_>> for Now {
+    fn from(progress: CalibrationProgress<'_>) -> Self {
+        let (what, done) = match progress {
+            CalibrationProgress::Reads { record, samples } => (format!("reading {record}"), samples),
+            CalibrationProgress::Passes(passes) => ("calibrating, linearisations".into(), passes),
         };
         Self::open(what, done as u64)
     }
@@ -54,12 +54,12 @@ pub struct Host<'a> {
     /// Symbolic engine; `None` if there is none.
     pub worker: Option<&'a mut Worker>,
     /// Receiver of the progress; it returns false to end the work.
-    pub going: &'a (dyn Fn(Now) -> bool + Sync),
+    pub progress: &'a (dyn Fn(Now) -> bool + Sync),
 }
 
 impl Host<'_> {
     /// Host without a symbolic engine that ignores progress.
     pub fn silent() -> Self {
-        Self { worker: None, going: &|_| true }
+        Self { worker: None, progress: &|_| true }
     }
 }

@@ -105,8 +105,8 @@ pub(crate) fn measured(
         order: a.order.map(Into::into),
         seed: wanted.seed,
     };
-    let going = |done| (host.going)(Now::open(format!("judging sets of outputs of {name}"), done));
-    sensors(&model, &options, &going).map_err(|e| wrong(&file, e))
+    let progress = |done| (host.progress)(Now::open(format!("judging sets of outputs of {name}"), done));
+    sensors(&model, &options, &progress).map_err(|e| wrong(&file, e))
 }
 
 /// Candidates for outputs, with the given costs.

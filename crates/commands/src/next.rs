@@ -121,8 +121,8 @@ pub(crate) fn further(
              [requirements] in the scheme file",
         ));
     }
-    let going = |done, all| (host.going)(Now::of("comparing extensions", done, all));
-    Ok(next(base, conditions, options, &going)?)
+    let progress = |done, all| (host.progress)(Now::of("comparing extensions", done, all));
+    Ok(next(base, conditions, options, &progress)?)
 }
 
 /// Covariance of a calibration of the platform of `base`, rescaled by its residuals. Positions, carry,

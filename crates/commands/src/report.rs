@@ -139,9 +139,9 @@ pub fn report(
     }
     let models: Vec<SystemModel> = files.iter().map(|f| f.model.clone()).collect();
     let options = ReviewOptions { runs: a.runs as usize, seed: a.seed };
-    let going = host.going;
+    let progress = host.progress;
     let reviewed = review(&entries, &models, options, host.worker.as_deref_mut(), &|what, share| {
-        going(Now::of(what, (share * 900.0) as u64, 1000))
+        progress(Now::of(what, (share * 900.0) as u64, 1000))
     });
     let review = reviewed.map_err(|e| match e {
         ReviewError::Simulation { name, error } => Problem::from(error).in_file(&name),

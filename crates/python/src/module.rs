@@ -248,7 +248,7 @@ fn in_threads(
     let pool = threads(py, ends)?;
     let wanted = Arc::new(AtomicBool::new(true));
     let last: Mutex<Option<Now>> = Mutex::new(None);
-    let going = |now: Now| {
+    let report = |now: Now| {
         // of several reports at a time one is enough
         if let Ok(mut last) = last.try_lock() {
             *last = Some(now);
@@ -256,7 +256,7 @@ fn in_threads(
         wanted.load(Ordering::Relaxed)
     };
     let answered = || {
-        let mut host = Host { worker: None, going: &going };
+        let mut host = Host { worker: None, progress: &report };
         if ends {
             return Some(work(&mut host));
         }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 /// `explanations` those of single verdicts (`why`) in words. A failure is `{"problem": {"kind", "message",
 /// "place"}}`. `going` receives progress; it returns false to end the work.
 pub(crate) fn call(command: &str, request: &str, going: &(dyn Fn(Now) -> bool + Sync)) -> String {
-    let mut host = Host { worker: None, going };
+    let mut host = Host { worker: None, progress: going };
     match obsdeg_commands::call_json(command, request, &mut host) {
         Ok(a) => json!({
             "text": a.text, "sentences": a.sentences, "explanations": a.explanations, "passed": a.passed

@@ -216,9 +216,9 @@ fn what_does_not_belong_is_refused_by_name() {
         );
         assert!(design_part(base, conditions, options, wrong, None, &on).is_err());
     }
-    let going_on = design_part(base, conditions, options, [1, 3], Some(two), &on).expect_err("another part");
+    let resumed = design_part(base, conditions, options, [1, 3], Some(two), &on).expect_err("another part");
     let why = PartError::Number { found: [2, 3], expected: [1, 3] };
-    assert_eq!(going_on, DesignError::Part { name: "the part to go on with".into(), why });
+    assert_eq!(resumed, DesignError::Part { name: "the part to go on with".into(), why });
 }
 
 /// Parts have similar amounts of work, even where most sequences begin with the first starts.

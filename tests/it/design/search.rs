@@ -222,8 +222,8 @@ fn long_searches_hear_of_an_interruption() {
         // the first calls come from the search for the fewest positions, later ones from the steps after it
         for patience in [0, 20, 200] {
             let asked = std::sync::atomic::AtomicU64::new(0);
-            let going = |_: Progress| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < patience;
-            match design(&base(Carry::Inertial), &conditions, &options, &going) {
+            let progress = |_: Progress| asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < patience;
+            match design(&base(Carry::Inertial), &conditions, &options, &progress) {
                 Err(DesignError::Interrupted) => {}
                 Ok(found) => assert!(found.search.is_some_and(|s| s.interrupted) && !found.found.is_empty()),
                 Err(e) => panic!("{e}"),

@@ -11,7 +11,7 @@ pub use answer::{
     AllanDeviation, ColumnNoise, NoiseCoefficient, NoiseKind, NoiseSetting, SensorKind, SensorNoiseReport,
 };
 
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::record::{Record, RecordError, STANDARD_GRAVITY};
 use static_record::{Channel, StaticRecord};
 
@@ -121,9 +121,9 @@ impl Default for NoiseOptions {
 pub fn sensor_noise(
     record: Record,
     options: &NoiseOptions,
-    going: &dyn Fn(Going<'_>) -> bool,
+    progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
 ) -> Result<SensorNoiseReport, NoiseError> {
-    let read = StaticRecord::read(record, options, going)?;
+    let read = StaticRecord::read(record, options, progress)?;
     let columns =
         read.channels.iter().map(|c| column(&read, c, options)).collect::<Result<Vec<ColumnNoise>, _>>()?;
     let settings = settings::of(&columns, read.interval_s);

@@ -2,7 +2,7 @@
 
 use super::answer::SensorKind;
 use super::{NoiseError, NoiseOptions};
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::platform::TIMES;
 use crate::record::{MOST, Record, Wanted};
 
@@ -94,7 +94,7 @@ impl StaticRecord {
     pub(super) fn read(
         record: Record,
         options: &NoiseOptions,
-        going: &dyn Fn(Going<'_>) -> bool,
+        progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
     ) -> Result<Self, NoiseError> {
         let time = record.find("t").ok_or_else(|| record.missing("`t [s]`"))?;
         let mut wanted = vec![record.wanted(time, &TIMES)?];
@@ -123,7 +123,7 @@ impl StaticRecord {
                 return Err(NoiseError::Long { record: name.clone(), most: MOST_NUMBERS });
             }
             let heard = !times.len().is_multiple_of(OFTEN)
-                || going(Going::Reads { record: &name, samples: times.len() });
+                || progress(CalibrationProgress::Reads { record: &name, samples: times.len() });
             if heard { Ok(()) } else { Err(NoiseError::Interrupted) }
         })?;
         let interval_s = usual(&times);

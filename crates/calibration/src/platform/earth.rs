@@ -217,7 +217,7 @@ impl AnswerData<'_> {
             unknowns: own.unknowns,
             sigmas: own.sigmas.clone(),
             known: own.known.clone(),
-            going: own.going,
+            progress: own.progress,
             passes: own.passes.clone(),
             stopped: own.stopped.clone(),
         };

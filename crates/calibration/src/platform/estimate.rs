@@ -15,7 +15,7 @@ use obsdeg_evidence::simulation::{Conditions, PlatformState};
 
 use super::CalibrationError;
 use super::run::{MeasurementKey, RecordedRun};
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::least_squares::{LeastSquaresSolution, Linearised, StackedRows, StartInformation};
 
 /// Most linearisations.
@@ -207,7 +207,7 @@ pub(crate) struct PlatformProblem<'a> {
     /// Prior information on some combinations: rows and values in SI units, with unit errors.
     pub known: Option<(DMatrix<f64>, DVector<f64>)>,
     /// Progress callback, called for every linearisation; the iteration ends when it returns false.
-    pub going: &'a dyn Fn(Going<'_>) -> bool,
+    pub progress: &'a dyn Fn(CalibrationProgress<'_>) -> bool,
     /// Number of linearisations.
     pub passes: Cell<usize>,
     /// True if the callback returned false.
@@ -247,7 +247,7 @@ impl PlatformProblem<'_> {
         nodes: impl Fn(usize) -> &'n [(usize, PlatformState)],
     ) -> Result<LinearisedRuns, CalibrationError> {
         self.passes.set(self.passes.get() + 1);
-        if !(self.going)(Going::Passes(self.passes.get())) {
+        if !(self.progress)(CalibrationProgress::Passes(self.passes.get())) {
             self.stopped.set(true);
         }
         let each = self.runs.iter().zip(&x).enumerate();

@@ -105,7 +105,7 @@ impl PlatformProblem<'_> {
                 unknowns: self.unknowns,
                 sigmas: self.sigmas.clone(),
                 known: self.known.clone(),
-                going: self.going,
+                progress: self.progress,
                 passes: Cell::new(self.passes.get()),
                 stopped: Cell::new(self.stopped.get()),
             };

@@ -35,7 +35,7 @@ use obsdeg_core::model::{Scheme, SchemeError};
 use obsdeg_ekf::EkfError;
 use obsdeg_evidence::simulation::{Conditions, Plan, RunStart, SimulationError, predict, si_per_shown};
 
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::answer::{Before, Calibration, CovarianceTable};
 pub use crate::record::STANDARD_GRAVITY;
 use crate::record::{Record, RecordError};
@@ -264,8 +264,8 @@ fn concern(scheme: &Scheme, records: &[Record]) -> Result<(), CalibrationError> 
 }
 
 /// Calibrates `scheme` from records of its runs. `conditions` give noise, steps (the length of bins) and
-/// slews. The progress callback `going` can stop the work: while a record is read there is then no answer,
-/// later the answer is the current iterate, with a finding.
+/// slews. The callback `progress` can stop the work: while a record is read there is then no answer, later
+/// the answer is the current iterate, with a finding.
 ///
 /// # Errors
 /// [`CalibrationError`].
@@ -274,7 +274,7 @@ pub fn calibrate(
     conditions: &Conditions,
     records: Vec<Record>,
     options: &Options,
-    going: &dyn Fn(Going<'_>) -> bool,
+    progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
 ) -> Result<Calibration, CalibrationError> {
     concern(scheme, &records)?;
     let own = run::conditions(conditions);
@@ -285,7 +285,7 @@ pub fn calibrate(
             what: "another mounting of the sensors (geometry)".into(),
         });
     }
-    let inputs = CalibrationInputs { scheme, conditions, own: &own, planned: &planned, options, going };
+    let inputs = CalibrationInputs { scheme, conditions, own: &own, planned: &planned, options, progress };
     let (mut runs, rests_on) = inputs.runs(records, &sigmas)?;
     let prediction = predict(&planned, options.seed)?;
     let start = RunStart::new(&planned, &own)?;

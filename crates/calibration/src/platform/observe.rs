@@ -10,7 +10,7 @@ use super::mistaken::Mistaken;
 use super::placed::{By, Reading, TOLERANCE};
 use super::record_columns::{ObservedColumns, RecordColumns, TIMES, units_of_force};
 use super::timeline;
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::bins::Bin;
 use crate::record::Record;
 
@@ -170,7 +170,7 @@ pub(crate) fn observe(
     gravity: f64,
     bin_s: f64,
     sigmas: Vec<f64>,
-    going: &dyn Fn(Going<'_>) -> bool,
+    progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
 ) -> Result<Reading, CalibrationError> {
     let record = record.named(&plan.platform.scheme().recording)?;
     let layout = RecordColumns::of(&record, plan, gravity)?;
@@ -179,7 +179,9 @@ pub(crate) fn observe(
     let record_columns: Vec<String> = record.columns().iter().map(|c| c.text.clone()).collect();
     let digest = record.read(&layout.wanted, layout.label, false, |row| {
         rows += 1;
-        if rows.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples: rows }) {
+        if rows.is_multiple_of(OFTEN)
+            && !progress(CalibrationProgress::Reads { record: &name, samples: rows })
+        {
             return Err(CalibrationError::Interrupted);
         }
         assignment.take(&row)

@@ -9,7 +9,7 @@ use super::gross::GrossReason;
 use super::observe::observe;
 use super::placed::Reading;
 use super::{CalibrationError, Options, run};
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::answer::{EmptyCells, Gap, PositionsBy};
 use crate::record::Record;
 
@@ -113,14 +113,15 @@ pub fn read_records(
     conditions: &Conditions,
     records: Vec<Record>,
     options: &Options,
-    going: &dyn Fn(Going<'_>) -> bool,
+    progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
 ) -> Result<RecordsRead, CalibrationError> {
     super::concern(scheme, &records)?;
     let own = run::conditions(conditions);
     let plan = Plan::new(scheme, &own)?;
     let sigmas: Vec<f64> = plan.components.iter().map(|&c| Plan::output_sigma(c, &own)).collect();
     let read = |record| {
-        let reading = observe(record, &plan, options.gravity_m_s2, conditions.step_s, sigmas.clone(), going)?;
+        let reading =
+            observe(record, &plan, options.gravity_m_s2, conditions.step_s, sigmas.clone(), progress)?;
         Ok(of(&reading, scheme))
     };
     let records = records.into_iter().map(read).collect::<Result<_, CalibrationError>>()?;

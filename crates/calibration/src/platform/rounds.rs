@@ -17,7 +17,7 @@ use super::offset::{Offset, SETTLED};
 use super::placed::Reading;
 use super::run::{MeasurementKey, RecordedRun};
 use super::{CalibrationError, Options, known};
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::answer::Calibration;
 use crate::record::Record;
 use crate::setup::Basis;
@@ -38,7 +38,7 @@ pub(super) struct CalibrationInputs<'a> {
     pub planned: &'a Plan,
     pub options: &'a Options,
     /// Progress callback.
-    pub going: &'a dyn Fn(Going<'_>) -> bool,
+    pub progress: &'a dyn Fn(CalibrationProgress<'_>) -> bool,
 }
 
 /// Unknowns of all runs with the prior information on them.
@@ -74,7 +74,7 @@ impl CalibrationInputs<'_> {
         let mut rests_on: Vec<Basis> = Vec::new();
         for record in records {
             let (gravity, step) = (self.options.gravity_m_s2, self.conditions.step_s);
-            let reading = observe(record, self.planned, gravity, step, sigmas.to_vec(), self.going)?;
+            let reading = observe(record, self.planned, gravity, step, sigmas.to_vec(), self.progress)?;
             let basis = Basis { record: reading.name.clone(), digest: reading.digest.clone() };
             let same = |other: String| CalibrationError::SameRecord { record: basis.record.clone(), other };
             if let Some(other) = basis.among(&rests_on) {
@@ -217,7 +217,7 @@ impl<'a> Rounds<'a> {
             unknowns: &self.known.unknowns,
             sigmas: self.sigmas.clone(),
             known: self.known.known.clone(),
-            going: self.inputs.going,
+            progress: self.inputs.progress,
             passes: Cell::new(self.passes),
             stopped: Cell::new(false),
         }

@@ -7,7 +7,7 @@ use obsdeg_core::system::{KnownInput, ModelError, StartTime, StateStart, SystemM
 
 use super::answer::{StatesStart, SystemCalibrationError};
 use super::units;
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::record::{MOST, Record, RecordError, RecordRow, Wanted};
 use crate::still::Detector;
 
@@ -315,7 +315,7 @@ pub(super) fn read(
     record: Record,
     model: &SystemModel,
     uses_time: bool,
-    going: &dyn Fn(Going<'_>) -> bool,
+    progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
 ) -> Result<Read, SystemCalibrationError> {
     let record = record.named(&model.recording)?;
     let columns = ModelColumns::of(&record, model)?;
@@ -334,7 +334,7 @@ pub(super) fn read(
     };
     let digest = record.read(&columns.wanted, columns.label, true, |row| {
         let samples = reader.rows.len() + 1;
-        if samples.is_multiple_of(OFTEN) && !going(Going::Reads { record: &name, samples }) {
+        if samples.is_multiple_of(OFTEN) && !progress(CalibrationProgress::Reads { record: &name, samples }) {
             return Err(SystemCalibrationError::Interrupted);
         }
         reader.take(&row)

@@ -7,12 +7,12 @@ use obsdeg_ekf::{EkfError, Measurement};
 use obsdeg_evidence::system::Numeric;
 
 use super::data::{Data, Read};
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::least_squares::{LeastSquaresSolution, StackedRows};
 
 /// Most iterations from a start.
 const PASSES: usize = 200;
-/// Number of rows of a long evaluation between two calls of `going`.
+/// Number of rows of a long evaluation between two calls of `progress`.
 const OFTEN: usize = 256;
 /// Number of integration steps from which an evaluation counts as long.
 pub(super) const LONG: f64 = 20_000.0;
@@ -33,10 +33,10 @@ pub(super) struct SystemProblem<'a> {
     pub(super) longest: f64,
     /// Rows and values of the prior information on the free unknowns, with unit errors.
     pub(super) known: (DMatrix<f64>, DVector<f64>),
-    /// True if an evaluation is long: `going` is then also called within it, and can end it.
+    /// True if an evaluation is long: `progress` is then also called within it, and can end it.
     pub(super) long: bool,
     /// Progress callback, called for every evaluation; iterations end when it returns false.
-    pub(super) going: &'a dyn Fn(Going<'_>) -> bool,
+    pub(super) progress: &'a dyn Fn(CalibrationProgress<'_>) -> bool,
     /// Number of evaluations.
     pub(super) passes: usize,
     /// True if the callback returned false.
@@ -125,7 +125,7 @@ impl SystemProblem<'_> {
         finer: usize,
     ) -> Result<ModelRows, EkfError> {
         self.passes += 1;
-        self.stopped |= !(self.going)(Going::Passes(self.passes));
+        self.stopped |= !(self.progress)(CalibrationProgress::Passes(self.passes));
         let start = ModelTrajectory::from_start(self.all(base, x), self.of_free(base, x));
         let mut out = ModelRows {
             rows: DMatrix::zeros(0, 0),
@@ -144,7 +144,7 @@ impl SystemProblem<'_> {
                 now = self.begin(&start, row);
             }
             let asked = self.long && k.is_multiple_of(OFTEN);
-            if asked && !(self.going)(Going::Passes(self.passes)) {
+            if asked && !(self.progress)(CalibrationProgress::Passes(self.passes)) {
                 self.stopped = true;
                 return Err(EkfError::Interrupted);
             }

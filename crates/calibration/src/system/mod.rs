@@ -27,7 +27,7 @@ pub use answer::{
     SystemEstimated, SystemFinding, SystemResidual,
 };
 
-use crate::Going;
+use crate::CalibrationProgress;
 use crate::answer::{Before, CovarianceTable};
 use crate::least_squares::LeastSquaresSolution;
 use crate::levels;
@@ -70,10 +70,10 @@ pub fn calibrate_system(
     model: &SystemModel,
     record: Record,
     options: &SystemCalibrationOptions,
-    going: &dyn Fn(Going<'_>) -> bool,
+    progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
 ) -> Result<SystemCalibration, SystemCalibrationError> {
     let compiled = model.compile()?;
-    let data = read(record, model, compiled.uses_time(), going)?;
+    let data = read(record, model, compiled.uses_time(), progress)?;
     let basis = Basis { record: data.name.clone(), digest: data.digest.clone() };
     let own = digest(model);
     let again = options.prior.as_ref().and_then(|b| Some((b, basis.among(&b.rests_on)?)));
@@ -84,11 +84,11 @@ pub fn calibrate_system(
     let mut numeric = Numeric::with_inputs(model, &compiled, &data.inputs)?;
     data.origins.iter().enumerate().for_each(|(experiment, t)| numeric.begin(experiment, *t));
     let stopped = Cell::new(false);
-    let going = |now: Going<'_>| {
-        stopped.set(!going(now) || stopped.get());
+    let progress = |now: CalibrationProgress<'_>| {
+        stopped.set(!progress(now) || stopped.get());
         !stopped.get()
     };
-    let found = Calibrating::new(model, &compiled, numeric, &data, options, &going)?.run();
+    let found = Calibrating::new(model, &compiled, numeric, &data, options, &progress)?.run();
     // an evaluation that was stopped leaves no numbers
     found.map_err(|e| if stopped.get() { SystemCalibrationError::Interrupted } else { e })
 }
@@ -190,7 +190,7 @@ impl<'a> Calibrating<'a> {
         numeric: Numeric<'a>,
         data: &'a Read,
         options: &'a SystemCalibrationOptions,
-        going: &'a dyn Fn(Going<'_>) -> bool,
+        progress: &'a dyn Fn(CalibrationProgress<'_>) -> bool,
     ) -> Result<Self, SystemCalibrationError> {
         let known = |state: &FilterState| match *state {
             FilterState::State { i, .. } => model.states[i].start != StateStart::Unknown,
@@ -210,7 +210,7 @@ impl<'a> Calibrating<'a> {
             longest,
             known,
             long,
-            going,
+            progress,
             passes: 0,
             stopped: false,
         };

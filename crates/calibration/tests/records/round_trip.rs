@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::answer::{Finding, PositionsBy};
 use obsdeg_calibration::record::Record;
-use obsdeg_calibration::{Calibration, CalibrationError, Going, Options, calibrate};
+use obsdeg_calibration::{Calibration, CalibrationError, CalibrationProgress, Options, calibrate};
 use obsdeg_core::model::settings::{Assignment, DriftNoise};
 use obsdeg_core::model::{Carry, Path, Recording, Scheme, Still, parse_attitude};
 use obsdeg_ekf::consistency::chi_square_band;
@@ -579,12 +579,18 @@ fn an_interrupt_leaves_what_there_is() {
     let until = |most: usize, reads: bool| {
         let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text.clone()))).expect("a record");
         let heard = std::cell::Cell::new(0);
-        let going = |now: Going<'_>| {
-            let counts = matches!(now, Going::Reads { .. }) == reads;
+        let progress = |now: CalibrationProgress<'_>| {
+            let counts = matches!(now, CalibrationProgress::Reads { .. }) == reads;
             heard.set(heard.get() + usize::from(counts));
             !counts || heard.get() < most
         };
-        calibrate(&scheme(&bench, "F,I,O,S"), &conditions(&bench), vec![record], &Options::default(), &going)
+        calibrate(
+            &scheme(&bench, "F,I,O,S"),
+            &conditions(&bench),
+            vec![record],
+            &Options::default(),
+            &progress,
+        )
     };
     assert_eq!(until(1, true), Err(CalibrationError::Interrupted));
     let whole = until(usize::MAX, false).expect("calibrated");

@@ -33,8 +33,8 @@ struct Listed {
 }
 
 /// Compares extensions of `base` under `conditions`. Without a prior covariance the positions of `base` come
-/// first. Added positions have the dwell of `conditions`. `going` receives the number of extensions compared
-/// so far and in total; if it returns false, the answer holds the best extensions so far.
+/// first. Added positions have the dwell of `conditions`. `progress` receives the number of extensions
+/// compared so far and in total; if it returns false, the answer holds the best extensions so far.
 ///
 /// # Errors
 /// [`DesignError`].
@@ -42,7 +42,7 @@ pub fn next(
     base: &Scheme,
     conditions: &Conditions,
     options: &NextOptions,
-    going: &(dyn Fn(u64, u64) -> bool + Sync),
+    progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Result<NextPositions, DesignError> {
     let stated = conditions;
     let conditions = &asked(base, conditions, &options.required)?;
@@ -50,14 +50,14 @@ pub fn next(
     let (candidates, beyond) = options.candidates.clone().within(&base.gimbals);
     let required = check(base, options, &candidates)?;
     let start = start(base, options);
-    let schedule = schedule(&start, conditions, &candidates, &required, options, going)?;
+    let schedule = schedule(&start, conditions, &candidates, &required, options, progress)?;
     let options = &match options.days.last() {
         Some(days) => NextOptions { beforehand: aged(&start, options, *days)?, ..options.clone() },
         None => options.clone(),
     };
     let compared =
         Compared { start: &start, conditions, candidates: &candidates, required: &required, options };
-    let Listed { mut found, examined, interrupted } = listed(&compared, going)?;
+    let Listed { mut found, examined, interrupted } = listed(&compared, progress)?;
     let Some(first) = found.first() else {
         return Err(if interrupted { DesignError::Interrupted } else { none_fits(options) });
     };
@@ -144,12 +144,15 @@ fn not_judged(stated: &Conditions, conditions: &Conditions) -> Vec<String> {
 }
 
 /// All extensions within the limits, best first.
-fn listed(compared: &Compared<'_>, going: &(dyn Fn(u64, u64) -> bool + Sync)) -> Result<Listed, DesignError> {
+fn listed(
+    compared: &Compared<'_>,
+    progress: &(dyn Fn(u64, u64) -> bool + Sync),
+) -> Result<Listed, DesignError> {
     let sequences = compared.sequences()?;
     let (all, done) = (sequences.len() as u64, AtomicU64::new(0));
     let judge = |sequence: &compared::Sequence| {
         let count = done.fetch_add(1, Ordering::Relaxed);
-        if going(count, all) { compared.extended(sequence).map(Some) } else { Ok(None) }
+        if progress(count, all) { compared.extended(sequence).map(Some) } else { Ok(None) }
     };
     let judged: Vec<Option<JudgedExtension>> = parallel::try_map(sequences.len(), |i| judge(&sequences[i]))?;
     let interrupted = judged.iter().any(Option::is_none);
@@ -186,7 +189,7 @@ fn schedule(
     candidates: &Candidates,
     required: &[String],
     options: &NextOptions,
-    going: &(dyn Fn(u64, u64) -> bool + Sync),
+    progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Result<Vec<Requalification>, DesignError> {
     let of_day = |&days: &f64| {
         let beforehand = aged(start, options, days)?;
@@ -209,7 +212,7 @@ fn schedule(
         for added in 1..=options.added {
             let options = with(added);
             let compared = Compared { start, conditions, candidates, required, options: &options };
-            let Listed { found, examined, interrupted } = listed(&compared, going)?;
+            let Listed { found, examined, interrupted } = listed(&compared, progress)?;
             if interrupted {
                 return Err(DesignError::Interrupted);
             }

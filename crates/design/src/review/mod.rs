@@ -140,8 +140,9 @@ fn scheme(
     let (simulation, record) = simulate(scheme, conditions, options.seed).map_err(failed)?;
     step(0.3, "evidence")?;
     let check = CrossCheckOptions { runs: options.runs, seed: options.seed, filter: Default::default() };
-    let going = |done: usize| step(0.3 + 0.4 * done as f64 / options.runs.max(1) as f64, "evidence").is_ok();
-    let evidence = match crosscheck(scheme, conditions, &check, &going) {
+    let evidence_progress =
+        |done: usize| step(0.3 + 0.4 * done as f64 / options.runs.max(1) as f64, "evidence").is_ok();
+    let evidence = match crosscheck(scheme, conditions, &check, &evidence_progress) {
         Err(SimulationError::Interrupted) => return Err(ReviewError::Interrupted),
         Err(e) if e != SimulationError::CrosscheckRotation && !e.is_numeric() => return Err(failed(e)),
         evidence => evidence,
@@ -321,8 +322,8 @@ fn alternatives(scheme: &Scheme, conditions: &Conditions, analysis: &Analysis, s
         seed,
         ..DesignOptions::default()
     };
-    let going = |_| true;
-    let mut run = |options: DesignOptions| match design(scheme, conditions, &options, &going) {
+    let progress = |_| true;
+    let mut run = |options: DesignOptions| match design(scheme, conditions, &options, &progress) {
         Ok(found) => Some(found),
         // no coefficients, generic angles, rotations: nothing to choose from
         Err(DesignError::Drift | DesignError::Rotation { .. } | DesignError::GenericAngle { .. }) => None,

@@ -155,7 +155,7 @@ impl TargetUnknown {
     }
 }
 
-/// Finds sets of outputs. `going` receives the number of sets judged; the search ends when it returns
+/// Finds sets of outputs. `progress` receives the number of sets judged; the search ends when it returns
 /// false.
 ///
 /// # Errors
@@ -163,7 +163,7 @@ impl TargetUnknown {
 pub fn sensors(
     model: &SystemModel,
     options: &SensorOptions,
-    going: &(dyn Fn(u64) -> bool + Sync),
+    progress: &(dyn Fn(u64) -> bool + Sync),
 ) -> Result<Sensors, SensorError> {
     let costs = checked(&options.candidates)?;
     let (whole, ranges) = model.measuring(&options.candidates, options.own_outputs);
@@ -188,7 +188,7 @@ pub fn sensors(
         };
         let n = gathered.judged.layout.unknowns.len() as u64;
         let most = (LIMITS * model.work_limit.operations() / (n * n * n / 2 + 1)).max(LEAST);
-        let search = SetSearch::new(&*first, costs.clone(), asked.len(), most, going);
+        let search = SetSearch::new(&*first, costs.clone(), asked.len(), most, progress);
         let mut task = SensorTask {
             model,
             options,

@@ -125,7 +125,7 @@ pub(crate) struct SetSearch<'a> {
     failing: Vec<Set>,
     /// Number of sets that may still be judged.
     left: u64,
-    going: &'a (dyn Fn(u64) -> bool + Sync),
+    progress: &'a (dyn Fn(u64) -> bool + Sync),
 }
 
 impl<'a> SetSearch<'a> {
@@ -134,12 +134,12 @@ impl<'a> SetSearch<'a> {
         costs: Vec<u64>,
         unknowns: usize,
         most: u64,
-        going: &'a (dyn Fn(u64) -> bool + Sync),
+        progress: &'a (dyn Fn(u64) -> bool + Sync),
     ) -> Self {
         let all = if costs.len() >= 64 { Set::MAX } else { (1 << costs.len()) - 1 };
         let limits = vec![None; unknowns];
         let (judged, relied_on, failing) = (HashMap::new(), HashSet::new(), Vec::new());
-        Self { ranks, costs, all, limits, unique: None, judged, relied_on, failing, left: most, going }
+        Self { ranks, costs, all, limits, unique: None, judged, relied_on, failing, left: most, progress }
     }
 
     /// Judges sets that are not judged yet, on all cores, and counts solutions where they are required.
@@ -157,7 +157,7 @@ impl<'a> SetSearch<'a> {
         for &set in sets.iter().filter(|set| self.worst_of(**set) < NONE) {
             if !unique.count(set) {
                 counted = Err(StopReason::Counts);
-            } else if !(self.going)(self.judged.len() as u64) {
+            } else if !(self.progress)(self.judged.len() as u64) {
                 counted = Err(StopReason::Interrupted);
             }
             if counted.is_err() {
@@ -182,7 +182,7 @@ impl<'a> SetSearch<'a> {
             _ => parallel::map(new.len(), |i| ranks.degrees(new[i])),
         };
         self.judged.extend(new.into_iter().zip(found));
-        match (self.going)(self.judged.len() as u64) {
+        match (self.progress)(self.judged.len() as u64) {
             true => Ok(()),
             false => Err(StopReason::Interrupted),
         }

@@ -60,7 +60,7 @@ impl Evaluator {
         &self,
         criterion: &Criterion,
         k: usize,
-        going: &dyn Fn() -> bool,
+        proceed: &dyn Fn() -> bool,
     ) -> Option<Everywhere> {
         if self.ordered() || k == 0 || !self.prior.is_alike() {
             return None;
@@ -73,7 +73,7 @@ impl Evaluator {
         };
         let mut here = self.clone();
         let mut problem = here.additive(objective, k);
-        let mut found: OptimalWeights = weigh(&problem, going)?;
+        let mut found: OptimalWeights = weigh(&problem, proceed)?;
         let scale = k as f64 * self.dph * self.dph;
         for _ in 0..ROUNDS {
             let energy = |c: &Matrix3<f64>| scale * self.energy(c, &found.dual.x);
@@ -83,7 +83,7 @@ impl Evaluator {
             // several starting points lead to the same peak
             new.sort_by_key(|e| e.each_ref().map(Angle::nanodeg));
             new.dedup();
-            if new.is_empty() || !going() {
+            if new.is_empty() || !proceed() {
                 break;
             }
             // attitudes without weight are dropped
@@ -92,7 +92,7 @@ impl Evaluator {
             attitudes.extend(new.iter().map(c_n_f64));
             here.stand_at(&attitudes);
             problem = here.additive(problem.objective.clone(), k);
-            found = weigh(&problem, going)?;
+            found = weigh(&problem, proceed)?;
         }
         let most = self.largest_energy(&found.dual.x, scale);
         let known = problem.gains(&found.dual.x).into_iter().fold(0.0, f64::max);
@@ -107,7 +107,7 @@ impl Evaluator {
         let (weights, attained) = listed(&problem, &weights).unwrap_or_else(exact);
         let support = support.into_iter().zip(weights).filter(|(_, w)| *w > 0.0).collect();
         let attained = attained.sqrt().max(value);
-        going().then_some(Everywhere { value, attained, support })
+        proceed().then_some(Everywhere { value, attained, support })
     }
 
     /// Upper bound on the contribution of one position at any attitude, X in units of deg/h, times `scale`.

@@ -45,18 +45,18 @@ impl Evaluator {
         criterion: &Criterion,
         k: usize,
         firsts: &[usize],
-        going: &dyn Fn() -> bool,
+        proceed: &dyn Fn() -> bool,
     ) -> Option<Bound> {
         if self.ordered() || self.candidates.is_empty() || k == 0 {
             return None;
         }
         let found = match criterion {
             Criterion::Margin(limits) if limits.psi.iter().any(|l| l.is_finite()) => {
-                self.with_psi(limits, k, firsts, going)?
+                self.with_psi(limits, k, firsts, proceed)?
             }
-            _ => self.weighed(self.objective(criterion), k, going)?,
+            _ => self.weighed(self.objective(criterion), k, proceed)?,
         };
-        (going() && found.value > 0.0).then_some(found)
+        (proceed() && found.value > 0.0).then_some(found)
     }
 
     /// Objective of a criterion, as a function of the information on the coefficients.
@@ -96,7 +96,7 @@ impl Evaluator {
         limits: &SigmaLimits,
         k: usize,
         firsts: &[usize],
-        going: &dyn Fn() -> bool,
+        proceed: &dyn Fn() -> bool,
     ) -> Option<Bound> {
         let every: Vec<usize> = if firsts.len() <= MOST_PSI { firsts.to_vec() } else { Vec::new() };
         let Objective::Largest(coefficients, none) = self.largest(limits) else { return None };
@@ -115,7 +115,7 @@ impl Evaluator {
                 vectors.set_column(at, &DVector::from_iterator(psi.moved.len(), moved));
                 offsets.push(psi.variances[k] * unit * unit);
             }
-            let found = self.weighed(Objective::Largest(vectors, offsets), k, going)?;
+            let found = self.weighed(Objective::Largest(vectors, offsets), k, proceed)?;
             if least.as_ref().is_none_or(|l| found.value < l.value) {
                 least = Some(found);
             }
@@ -124,9 +124,9 @@ impl Evaluator {
     }
 
     /// Bound by the weights that minimise the objective.
-    fn weighed(&self, objective: Objective, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
+    fn weighed(&self, objective: Objective, k: usize, proceed: &dyn Fn() -> bool) -> Option<Bound> {
         let problem = self.additive(objective, k);
-        let found = weigh(&problem, going)?;
+        let found = weigh(&problem, proceed)?;
         let exact = || (found.weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &found.weights).unwrap_or_else(exact);
         // the bound of exact weights may rest on rounding

@@ -82,12 +82,12 @@ struct WeightProblem<'a> {
     ridge: f64,
 }
 
-/// Optimal weights and the bound that they prove; stops when `going` returns false. `None` where all
+/// Optimal weights and the bound that they prove; stops when `proceed` returns false. `None` where all
 /// candidates together do not determine the unknowns that count in double precision.
-pub(super) fn weigh(problem: &Additive, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
+pub(super) fn weigh(problem: &Additive, proceed: &dyn Fn() -> bool) -> Option<OptimalWeights> {
     // the result is unknown if it depends on the ridge, and if rounding decides without the ridge
     [RIDGE, 0.0].into_iter().find_map(|ridge| {
-        let found = generated(problem, ridge, going)?;
+        let found = generated(problem, ridge, proceed)?;
         let singular = found.bound > found.attained * (1.0 + SINGULAR);
         (!singular).then(|| OptimalWeights { attained: found.attained.max(found.bound), ..found })
     })
@@ -130,7 +130,7 @@ fn rounded(weight: f64, digits: i32) -> f64 {
 }
 
 /// Optimal weights as [`weigh`], by column generation with the given ridge.
-fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
+fn generated(problem: &Additive, ridge: f64, proceed: &dyn Fn() -> bool) -> Option<OptimalWeights> {
     let all = problem.candidates.len();
     let mean = problem.candidates.iter().map(DMatrix::trace).sum::<f64>() / all as f64;
     let ridge = ridge * (mean + problem.prior.trace()) / problem.unknowns() as f64;
@@ -139,7 +139,7 @@ fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option
     let mut best: Option<OptimalWeights> = None;
     for _ in 0..ROUNDS {
         let weighing = WeightProblem::new(problem, active.clone(), ridge);
-        let Some(found) = weighing.weigh(going) else {
+        let Some(found) = weighing.weigh(proceed) else {
             // these candidates do not determine the unknowns that count: add more
             let missing = (0..all).filter(|i| !active.contains(i)).step_by(2).collect::<Vec<_>>();
             if missing.is_empty() {
@@ -159,7 +159,7 @@ fn generated(problem: &Additive, ridge: f64, going: &dyn Fn() -> bool) -> Option
         }
         let mut missing: Vec<usize> =
             (0..all).filter(|&i| gains[i] > of_active * (1.0 + GAP) && !active.contains(&i)).collect();
-        if missing.is_empty() || !going() {
+        if missing.is_empty() || !proceed() {
             break;
         }
         missing.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
@@ -273,7 +273,7 @@ impl<'a> WeightProblem<'a> {
     }
 
     /// Weights that minimise the objective, step by step, with the best bound of all steps.
-    fn weigh(&self, going: &dyn Fn() -> bool) -> Option<OptimalWeights> {
+    fn weigh(&self, proceed: &dyn Fn() -> bool) -> Option<OptimalWeights> {
         let n = self.active.len();
         let mut w = vec![1.0 / n as f64; n];
         let mut scale = self.objective(&w)?;
@@ -299,7 +299,7 @@ impl<'a> WeightProblem<'a> {
                 best = Some(OptimalWeights { weights, attained: scale, bound, dual });
             }
             let sought = best.as_ref().map_or(0.0, |b| b.attained / b.bound - 1.0);
-            if sought < GAP || !going() {
+            if sought < GAP || !proceed() {
                 break;
             }
             tau *= FASTER;

@@ -26,16 +26,16 @@ impl Evaluator {
         required: &[usize],
         conditions: &Conditions,
     ) -> Result<Self, DesignError> {
-        Self::while_going((base, candidates), required, (conditions, None), &|| true)
+        Self::interruptible((base, candidates), required, (conditions, None), &|| true)
     }
 
-    /// Evaluator with errors that are not estimated and count. Stops when `going` returns false: slew
+    /// Evaluator with errors that are not estimated and count. Stops when `proceed` returns false: slew
     /// paths between many candidates take time.
-    pub(crate) fn while_going(
+    pub(crate) fn interruptible(
         (base, candidates): (&Scheme, &[Euler]),
         required: &[usize],
         (conditions, omitted): (&Conditions, Option<OmittedErrors>),
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
         let scheme = Scheme {
             positions: Scheme::of_angles(candidates.iter().take(1).cloned()).positions,
@@ -80,7 +80,7 @@ impl Evaluator {
             dph,
         };
         let attitudes: Vec<Matrix3<f64>> = candidates.iter().map(c_n_f64).collect();
-        empty.with_dwell(conditions.dwell_s)?.among(&attitudes, going)
+        empty.with_dwell(conditions.dwell_s)?.among(&attitudes, proceed)
     }
 }
 

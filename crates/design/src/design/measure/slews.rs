@@ -16,7 +16,7 @@ impl Evaluator {
     pub(crate) fn among(
         mut self,
         attitudes: &[Matrix3<f64>],
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
         self.stand_at(attitudes);
         if self.conditions.slew_rate_deg_s.is_some() {
@@ -26,7 +26,7 @@ impl Evaluator {
             }
             self.slew_paths = parallel::try_map(found * found, |k| {
                 let shortest_path = || self.shortest_path(&attitudes[k / found], &attitudes[k % found]);
-                going().then(shortest_path).ok_or(DesignError::Interrupted)
+                proceed().then(shortest_path).ok_or(DesignError::Interrupted)
             })?;
         }
         Ok(self)

@@ -55,19 +55,19 @@ pub struct EnumerationLimits<'a> {
     /// Number of prefixes and sets that may still be examined.
     pub budget: u64,
     /// Cancellation callback: false ends the enumeration.
-    pub going: &'a (dyn Fn() -> bool + Sync),
+    pub proceed: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl<'a> EnumerationLimits<'a> {
-    /// Limits without a budget: the enumeration stops when `going` returns false.
-    pub(crate) fn while_going(going: &'a (dyn Fn() -> bool + Sync)) -> Self {
-        Self { budget: u64::MAX, going }
+    /// Limits without a budget: the enumeration stops when `proceed` returns false.
+    pub(crate) fn without_budget(proceed: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { budget: u64::MAX, proceed }
     }
 
     /// Counts one set or prefix; false if the enumeration must end.
     fn goes_on(&mut self) -> bool {
         self.budget = self.budget.saturating_sub(1);
-        if self.budget.is_multiple_of(PATIENCE) && !(self.going)() {
+        if self.budget.is_multiple_of(PATIENCE) && !(self.proceed)() {
             self.budget = 0;
         }
         self.budget > 0
@@ -219,7 +219,7 @@ impl AttitudeRows {
     pub fn observable_sets(&self, size: usize) -> Vec<Vec<usize>> {
         let behind = |first: usize| {
             let mut out = Vec::new();
-            self.each(&[first], size, false, &mut EnumerationLimits::while_going(&|| true), &mut |set| {
+            self.each(&[first], size, false, &mut EnumerationLimits::without_budget(&|| true), &mut |set| {
                 out.push(set.to_vec());
                 true
             });
@@ -230,16 +230,16 @@ impl AttitudeRows {
 
     /// First observable set of `size` candidates that begins with one of `firsts`, and true if no enumeration
     /// was cut short. At most `budget` prefixes and sets are examined for each of `firsts`; stops when
-    /// `going` returns false.
+    /// `proceed` returns false.
     pub(crate) fn first_observable_set(
         &self,
         size: usize,
         firsts: &[usize],
         budget: u64,
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> (Option<Vec<usize>>, bool) {
         let found: Vec<(Option<Vec<usize>>, bool)> = parallel::map(firsts.len(), |i| {
-            let (mut out, mut patience) = (None, EnumerationLimits { budget, going });
+            let (mut out, mut patience) = (None, EnumerationLimits { budget, proceed });
             self.each(&[firsts[i]], size, false, &mut patience, &mut |set| {
                 out = Some(set.to_vec());
                 false

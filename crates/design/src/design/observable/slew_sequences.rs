@@ -253,7 +253,7 @@ impl SlewSequenceSearch {
         &self,
         lengths: Range<usize>,
         out: &mut ShortestSlewSequence,
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> (Option<Vec<usize>>, bool) {
         for length in lengths {
             let count = self.sequences(length);
@@ -262,13 +262,13 @@ impl SlewSequenceSearch {
             }
             let seen = AtomicU64::new(0);
             let stopped = AtomicBool::new(false);
-            let going = || {
-                let go = !stopped.load(Ordering::Relaxed) && going();
+            let proceed = || {
+                let go = !stopped.load(Ordering::Relaxed) && proceed();
                 stopped.fetch_or(!go, Ordering::Relaxed);
                 go
             };
             let found = parallel::find_first(self.neighbours.len(), |c| {
-                self.search(&self.fields[0].start(c), length, &seen, &going)
+                self.search(&self.fields[0].start(c), length, &seen, &proceed)
             });
             if found.is_some() {
                 return (found, true);
@@ -293,10 +293,10 @@ impl SlewSequenceSearch {
         sequence: &SlewSequence,
         length: usize,
         seen: &AtomicU64,
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> Option<Vec<usize>> {
         if sequence.places.len() == length {
-            if seen.fetch_add(1, Ordering::Relaxed).is_multiple_of(PATIENCE) && !going() {
+            if seen.fetch_add(1, Ordering::Relaxed).is_multiple_of(PATIENCE) && !proceed() {
                 return None;
             }
             return (self.does(&sequence.basis) || self.does_elsewhere(&sequence.places))
@@ -304,12 +304,12 @@ impl SlewSequenceSearch {
         }
         let left = length - sequence.places.len();
         // every required coefficient needs a row of its own
-        if sequence.basis.rank() + self.most * left < self.required.len() || !going() {
+        if sequence.basis.rank() + self.most * left < self.required.len() || !proceed() {
             return None;
         }
         let here = *sequence.places.last()?;
         let next = |&(turn, to): &(usize, usize)| {
-            self.search(&self.fields[0].go(sequence, turn, to), length, seen, going)
+            self.search(&self.fields[0].go(sequence, turn, to), length, seen, proceed)
         };
         if sequence.places.len() < 4 {
             let neighbours = &self.neighbours[here];
@@ -362,7 +362,7 @@ impl SlewSequenceSearch {
     }
 
     /// Short sufficient slew sequence, by beam search.
-    fn short(&self, seed: u64, going: &(dyn Fn() -> bool + Sync)) -> Option<SlewSequence> {
+    fn short(&self, seed: u64, proceed: &(dyn Fn() -> bool + Sync)) -> Option<SlewSequence> {
         let mut rng = SplitMix64::new(seed);
         let mut beam: Vec<SlewSequence> =
             (0..self.neighbours.len()).map(|c| self.fields[0].start(c)).collect();
@@ -370,7 +370,7 @@ impl SlewSequenceSearch {
             if let Some(done) = beam.iter().find(|w| self.does(&w.basis)) {
                 return Some(done.clone());
             }
-            if !going() {
+            if !proceed() {
                 return None;
             }
             let grown = |sequence: &SlewSequence| -> Vec<SlewSequence> {
@@ -395,14 +395,14 @@ impl SlewSequenceSearch {
 
 /// Finds the fewest positions of a slew sequence over candidates that makes the required coefficients
 /// observable under the assumptions of `base`. Its carry must be inertial and its torquer errors
-/// unknown. Stops when `going` returns false.
+/// unknown. Stops when `proceed` returns false.
 ///
 /// # Errors
 /// [`DesignError`].
 pub fn shortest_slew_sequence(
     base: &Scheme,
     options: &SlewSequenceOptions,
-    going: &(dyn Fn() -> bool + Sync),
+    proceed: &(dyn Fn() -> bool + Sync),
 ) -> Result<ShortestSlewSequence, DesignError> {
     let attitudes = &options.candidates.attitudes;
     let (neighbours, tour) = tour(attitudes, options.most_turn_deg);
@@ -417,7 +417,7 @@ pub fn shortest_slew_sequence(
     let whole = space.along(&tour);
     let lost = space.required.iter().filter(|c| !whole.basis.has_unit(3 + **c));
     let never: Vec<String> = lost.map(|&c| all[c].clone()).collect();
-    let shortest = if never.is_empty() { space.short(options.seed, going) } else { None };
+    let shortest = if never.is_empty() { space.short(options.seed, proceed) } else { None };
     let longest = shortest.as_ref().map_or(LONGEST, |w| w.places.len());
     let mut out = ShortestSlewSequence {
         schema: SLEW_SEQUENCE_SCHEMA.into(),
@@ -442,7 +442,7 @@ pub fn shortest_slew_sequence(
         seed: options.seed,
     };
     let lengths = if out.never.is_empty() { out.counting_bound..longest } else { 0..0 };
-    let (shorter, complete) = space.exhausted(lengths, &mut out, going);
+    let (shorter, complete) = space.exhausted(lengths, &mut out, proceed);
     if let Some(places) = shorter.or(shortest.map(|w| w.places)) {
         out.positions = Some(places.len());
         out.rank[0] = space.along(&places).basis.rank();

@@ -58,7 +58,7 @@ pub(crate) struct Moves<'a> {
     pub(crate) constraints: &'a Constraints,
     pub(crate) criterion: &'a Criterion,
     /// Stops when the callback returns false.
-    pub(crate) going: &'a (dyn Fn() -> bool + Sync),
+    pub(crate) proceed: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// Nearest multiple of `step` 1e-9 degrees.
@@ -148,13 +148,13 @@ impl Moves<'_> {
                     (0..start.len()).for_each(|place| {
                         self.move_one(&mut here, &mut best, place, GridMove { by, step }, &mut root);
                     });
-                    if !best.order(&round).is_lt() || !(self.going)() {
+                    if !best.order(&round).is_lt() || !(self.proceed)() {
                         break;
                     }
                 }
                 by /= 2;
             }
-            if !best.order(&before).is_lt() || !(self.going)() {
+            if !best.order(&before).is_lt() || !(self.proceed)() {
                 break;
             }
         }

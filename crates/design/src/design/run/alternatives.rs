@@ -99,8 +99,8 @@ impl AlternativeSearch<'_> {
         }
         let candidates = candidates.unwrap_or_else(|| self.options.candidates.clone());
         let options = DesignOptions { positions: Some(k), candidates, ..self.options.clone() };
-        let going = || (self.progress)(NOTHING_YET);
-        let prepared = PreparedSearch::new(self.base, self.conditions, &options, &going)?;
+        let proceed = || (self.progress)(NOTHING_YET);
+        let prepared = PreparedSearch::new(self.base, self.conditions, &options, &proceed)?;
         if prepared.check(k).is_err() {
             return Ok(None);
         }
@@ -120,8 +120,8 @@ impl AlternativeSearch<'_> {
     /// two, then by bisection.
     fn longer(&mut self, nearest: &Scored, k: usize) -> Result<(), DesignError> {
         let options = DesignOptions { positions: Some(k), ..self.options.clone() };
-        let going = || (self.progress)(NOTHING_YET);
-        let prepared = PreparedSearch::new(self.base, self.conditions, &options, &going)?;
+        let proceed = || (self.progress)(NOTHING_YET);
+        let prepared = PreparedSearch::new(self.base, self.conditions, &options, &proceed)?;
         let known = self.conditions.dwell_s;
         let mut examined = 0;
         let mut tried = |dwell_s: f64| -> Result<Option<Found>, DesignError> {
@@ -138,13 +138,13 @@ impl AlternativeSearch<'_> {
             Ok(found.into_iter().next().filter(|f| f.requirements.all_met()))
         };
         let (mut short, mut long, mut found) = (known, known, None);
-        while found.is_none() && long < known * LONGEST && going() {
+        while found.is_none() && long < known * LONGEST && proceed() {
             short = long;
             long = rounded_up(2.0 * long);
             found = tried(long)?;
         }
         self.out.longest_s = long;
-        while found.is_some() && long > short * 1.01 && going() {
+        while found.is_some() && long > short * 1.01 && proceed() {
             let middle = rounded_up(0.5 * (short + long));
             if middle >= long {
                 break;

@@ -43,8 +43,8 @@ pub(crate) fn everywhere(
 
 impl Task<'_> {
     /// Lower bound on the criterion of schemes of `k` candidates.
-    pub(crate) fn bound(&self, evaluator: &Evaluator, k: usize, going: &dyn Fn() -> bool) -> Option<Bound> {
-        evaluator.bound(&self.criterion, k, &self.symmetry.representatives(), going)
+    pub(crate) fn bound(&self, evaluator: &Evaluator, k: usize, proceed: &dyn Fn() -> bool) -> Option<Bound> {
+        evaluator.bound(&self.criterion, k, &self.symmetry.representatives(), proceed)
     }
 
     /// Criterion of a scheme with its rounding tolerance, for its information as evaluated.
@@ -89,7 +89,7 @@ impl Task<'_> {
         &self,
         evaluator: &Evaluator,
         (k, dwell_s): (usize, f64),
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> Vec<[f64; 2]> {
         let mut counts = vec![k];
         counts.extend(self.options.front.iter().filter(|f| **f != k));
@@ -101,7 +101,7 @@ impl Task<'_> {
             let least = counts.iter().filter_map(|&count| {
                 // a dwell of too many steps is no point of the front
                 let there = evaluator.clone().with_dwell(total / count as f64).ok()?;
-                Some(self.bound(&there, count, going).map(|b| b.value))
+                Some(self.bound(&there, count, proceed).map(|b| b.value))
             });
             // no point unless the bound is known for every number of positions
             least

@@ -52,20 +52,20 @@ pub(crate) fn answered(
     let stated = conditions;
     let conditions = &asked(base, conditions, &options.required)?;
     watched(progress, |progress, stopped| {
-        let going = || progress(NOTHING_YET);
+        let proceed = || progress(NOTHING_YET);
         let free =
             options.free.map(|step| Free::new(base, conditions, options, step, progress)).transpose()?;
         let chosen =
             free.as_ref().map(|f| DesignOptions { candidates: f.candidates.clone(), ..options.clone() });
         let options = chosen.as_ref().unwrap_or(options);
-        let prepared = PreparedSearch::new(base, conditions, options, &going)?;
-        let (mut out, mut sets) = fewest(&prepared, stated, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, options, &proceed)?;
+        let (mut out, mut sets) = fewest(&prepared, stated, &proceed)?;
         let Some(k) = options.positions else { return Ok(out) };
         prepared.check(k)?;
         let (task, evaluator) = (&prepared.task, &prepared.evaluator);
         let search = prepared.search(progress);
-        let run = SchemeSearch { prepared: &prepared, free: free.as_ref(), search, k, going: &going };
-        let bound = task.bound(evaluator, k, &going);
+        let run = SchemeSearch { prepared: &prepared, free: free.as_ref(), search, k, proceed: &proceed };
+        let bound = task.bound(evaluator, k, &proceed);
         let (merged, parts) = elsewhere.map(|parts| parts(&prepared, k)).transpose()?.unzip();
         let (best, exhaustive) = match (merged, &free) {
             (Some(merged), _) => (merged, task.space(k, evaluator)),
@@ -108,11 +108,11 @@ pub(crate) fn answered(
 fn fewest(
     prepared: &PreparedSearch<'_>,
     stated: &Conditions,
-    going: &(dyn Fn() -> bool + Sync),
+    proceed: &(dyn Fn() -> bool + Sync),
 ) -> Result<(Design, f64), DesignError> {
     let task = &prepared.task;
     let base = task.base;
-    let minimum = task.minimum(&prepared.degrees, going)?;
+    let minimum = task.minimum(&prepared.degrees, proceed)?;
     let sets = minimum.none_of.iter().fold(0.0, |sum, [_, sets]| sum + *sets as f64);
     let mut out = Design {
         schema: SCHEMA.into(),
@@ -152,7 +152,7 @@ struct SchemeSearch<'a> {
     search: SequenceSearch<'a>,
     k: usize,
     /// Cancellation callback: false stops the search.
-    going: &'a (dyn Fn() -> bool + Sync),
+    proceed: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl SchemeSearch<'_> {
@@ -202,13 +202,13 @@ impl SchemeSearch<'_> {
         certificate: Option<&mut Certificate>,
     ) -> Result<(), DesignError> {
         let (task, evaluator) = (&self.prepared.task, &self.prepared.evaluator);
-        let (search, free, going, k) = (&self.search, self.free, self.going, self.k);
+        let (search, free, proceed, k) = (&self.search, self.free, self.proceed, self.k);
         let options = task.options;
         let of = (k, self.prepared.conditions.dwell_s);
         let certified = certificate.is_some();
         let wanted = certified && options.everywhere && free.is_none();
-        let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, going)).flatten();
-        let line = || certified.then(|| task.front_bound(evaluator, of, going));
+        let over_all = || wanted.then(|| evaluator.everywhere(&task.criterion, k, proceed)).flatten();
+        let line = || certified.then(|| task.front_bound(evaluator, of, proceed));
         let (more, (found, line)) =
             parallel::join(|| task.front(evaluator, search, of, best), || parallel::join(over_all, line));
         front.extend(more?);
@@ -226,15 +226,15 @@ impl SchemeSearch<'_> {
     /// Adds the first scheme with its angles refined, and with its time divided, as far as they are asked
     /// for.
     fn polish(&self, first: &Scored, out: &mut Design) -> Result<(), DesignError> {
-        let (task, evaluator, going) = (&self.prepared.task, &self.prepared.evaluator, self.going);
-        if task.options.refine && going() {
-            let refined = task.refined(evaluator, first, going)?;
+        let (task, evaluator, proceed) = (&self.prepared.task, &self.prepared.evaluator, self.proceed);
+        if task.options.refine && proceed() {
+            let refined = task.refined(evaluator, first, proceed)?;
             out.front.extend(refined.iter().cloned());
             let refined = refined.filter(|f| improves(task, f, out.found.first()));
             put_first(&mut out.found, refined);
         }
-        if task.options.divide && going() {
-            let divided = task.divided(evaluator, first, going)?;
+        if task.options.divide && proceed() {
+            let divided = task.divided(evaluator, first, proceed)?;
             out.front.extend(divided.iter().cloned());
             let divided = divided.filter(|f| improves(task, f, out.found.first()));
             put_first(&mut out.found, divided);

@@ -69,7 +69,7 @@ impl Free {
         step: i64,
         progress: &(dyn Fn(Progress) -> bool + Sync),
     ) -> Result<Self, DesignError> {
-        let going = || progress(NOTHING_YET);
+        let proceed = || progress(NOTHING_YET);
         let wrong = |found: String| DesignError::Free { found };
         let k = options.positions.ok_or_else(|| wrong("no number of positions".into()))?;
         if base.carry != Carry::Reset {
@@ -78,7 +78,7 @@ impl Free {
         if step <= 0 {
             return Err(wrong(format!("angles rounded to {} degrees", format_decimal(step))));
         }
-        let prepared = PreparedSearch::new(base, conditions, options, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, options, &proceed)?;
         prepared.check(k)?;
         if prepared.evaluator.bias.is_some() {
             return Err(wrong("noise of Z that is correlated from position to position".into()));
@@ -86,7 +86,7 @@ impl Free {
         if !prepared.evaluator.prior.is_alike() {
             return Err(wrong("priors of psi that differ by axis".into()));
         }
-        let every = prepared.evaluator.everywhere(&prepared.task.criterion, k, &going);
+        let every = prepared.evaluator.everywhere(&prepared.task.criterion, k, &proceed);
         let every = every.ok_or(DesignError::Interrupted)?;
         let (candidates, _) = Candidates::cardinals().within(&base.gimbals);
         let mut out =
@@ -118,9 +118,9 @@ impl Free {
         (k, step): (usize, i64),
         progress: &(dyn Fn(Progress) -> bool + Sync),
     ) -> Result<(), DesignError> {
-        let going = || progress(NOTHING_YET);
+        let proceed = || progress(NOTHING_YET);
         let chosen = DesignOptions { candidates: self.candidates.clone(), ..options.clone() };
-        let prepared = PreparedSearch::new(base, conditions, &chosen, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, &chosen, &proceed)?;
         let task = &prepared.task;
         let search = SequenceSearch { keep: options.restarts as usize, ..prepared.search(progress) };
         let best = search.exchange(k, &task.sequences_of(&self.starts), options.restarts, options.seed);
@@ -137,7 +137,7 @@ impl Free {
             gimbals: &base.gimbals,
             constraints: &task.constraints,
             criterion: &task.criterion,
-            going: &going,
+            proceed: &proceed,
         };
         let mut moved: Vec<OnGrids> = parallel::map(first.len(), |i| moves.rounded(&first[i], step));
         self.examined += moved.iter().map(|m| m.finer.examined + m.on_step.examined).sum::<u64>();
@@ -160,14 +160,14 @@ impl Free {
         k: usize,
         progress: &(dyn Fn(Progress) -> bool + Sync),
     ) -> Result<(), DesignError> {
-        let going = || progress(NOTHING_YET);
+        let proceed = || progress(NOTHING_YET);
         let options = of_cardinals(options);
-        let prepared = PreparedSearch::new(base, conditions, &options, &going)?;
+        let prepared = PreparedSearch::new(base, conditions, &options, &proceed)?;
         if prepared.check(k).is_err() {
             return Ok(());
         }
         let search = prepared.search(progress);
-        let bound = prepared.task.bound(&prepared.evaluator, k, &going);
+        let bound = prepared.task.bound(&prepared.evaluator, k, &proceed);
         self.cardinal = Some((search.floor, bound.map_or(0.0, |b| b.value)));
         let best = search.exchange(k, &[], options.restarts, options.seed);
         self.examined += best.examined;
@@ -199,9 +199,9 @@ impl Free {
             // no free scheme found beats the bound on the cardinal attitudes: search these as without free
             // attitudes
             let options = of_cardinals(task.options);
-            let going = || (search.progress)(NOTHING_YET);
-            let cardinal = PreparedSearch::new(task.base, prepared.conditions, &options, &going)?;
-            let bound = cardinal.task.bound(&cardinal.evaluator, k, &going);
+            let proceed = || (search.progress)(NOTHING_YET);
+            let cardinal = PreparedSearch::new(task.base, prepared.conditions, &options, &proceed)?;
+            let bound = cardinal.task.bound(&cardinal.evaluator, k, &proceed);
             let (found, _) = cardinal.searched(&cardinal.search(search.progress), k, bound.as_ref());
             let starts: Vec<Vec<Euler>> = found.found.iter().map(|s| cardinal.task.placed(s).0).collect();
             best.examined += found.examined;

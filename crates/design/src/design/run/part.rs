@@ -205,9 +205,9 @@ pub fn design_starts(
     conditions: &Conditions,
     options: &DesignOptions,
 ) -> Result<usize, DesignError> {
-    let going = || true;
+    let proceed = || true;
     let conditions = &asked(base, conditions, &options.required)?;
-    let prepared = PreparedSearch::new(base, conditions, options, &going)?;
+    let prepared = PreparedSearch::new(base, conditions, options, &proceed)?;
     let k = options.positions.filter(|_| options.free.is_none()).ok_or(DesignError::Parts)?;
     Ok(prepared.search(&|_| true).starts(&prepared.task.symmetry, k).len())
 }
@@ -242,8 +242,8 @@ pub fn design_part(
     }
     let conditions = &asked(base, conditions, &options.required)?;
     watched(progress, |progress, _| {
-        let going = || progress(NOTHING_YET);
-        let prepared = PreparedSearch::new(base, conditions, options, &going)?;
+        let proceed = || progress(NOTHING_YET);
+        let prepared = PreparedSearch::new(base, conditions, options, &proceed)?;
         prepared.check(k)?;
         prepared.exhaustible(k)?;
         let search = prepared.search(progress);

@@ -39,7 +39,7 @@ impl<'a> PreparedSearch<'a> {
         base: &'a Scheme,
         conditions: &'a Conditions,
         options: &'a DesignOptions,
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> Result<Self, DesignError> {
         if is_slew_sequence(base) {
             check_slew_sequence(base, conditions, options)?;
@@ -56,7 +56,8 @@ impl<'a> PreparedSearch<'a> {
         let evaluated = options.positions.map_or(1, |_| task.candidates.attitudes.len());
         let attitudes = &task.candidates.attitudes[..evaluated];
         let omitted = task.omitted.clone();
-        let evaluator = Evaluator::while_going((base, attitudes), &indices, (conditions, omitted), going)?;
+        let evaluator =
+            Evaluator::interruptible((base, attitudes), &indices, (conditions, omitted), proceed)?;
         if let Some(most) = options.positions.iter().chain(&options.front).max() {
             evaluator.check_immune(&options.immune, *most, conditions)?;
         }

@@ -363,7 +363,7 @@ impl<'a> Task<'a> {
     pub(crate) fn minimum(
         &self,
         best_degrees: &[Option<usize>],
-        going: &(dyn Fn() -> bool + Sync),
+        proceed: &(dyn Fn() -> bool + Sync),
     ) -> Result<Minimum, DesignError> {
         let names = |set: &[usize]| set.iter().map(|&c| self.candidates.names[c].clone()).collect();
         let mut out = Minimum {
@@ -391,8 +391,8 @@ impl<'a> Task<'a> {
         let n = self.rows.candidates() as u64;
         for size in out.counting_bound..=self.rows.candidates() {
             let sets = choose(n, size as u64).unwrap_or(u64::MAX);
-            let (set, all) = self.rows.first_observable_set(size, &firsts, most, going);
-            if !going() {
+            let (set, all) = self.rows.first_observable_set(size, &firsts, most, proceed);
+            if !proceed() {
                 return Err(DesignError::Interrupted);
             }
             match set {
@@ -637,11 +637,11 @@ impl<'a> Task<'a> {
         &self,
         evaluator: &Evaluator,
         best: &Scored,
-        going: &dyn Fn() -> bool,
+        proceed: &dyn Fn() -> bool,
     ) -> Result<Option<Found>, DesignError> {
         let (attitudes, path) = self.placed(best);
         let along = evaluator.along(&attitudes.iter().map(c_n_f64).collect::<Vec<_>>());
-        let allowed = |there: &Evaluator| going() && self.constraints.keep(there, &path);
+        let allowed = |there: &Evaluator| proceed() && self.constraints.keep(there, &path);
         let divided = divide::divide(&along, &path, &self.criterion, &allowed)?;
         let Some((value, there)) = divided else { return Ok(None) };
         let names = best.sequence.iter().map(|s| self.candidates.names[s.candidate].clone()).collect();
@@ -656,11 +656,11 @@ impl<'a> Task<'a> {
         &self,
         evaluator: &Evaluator,
         best: &Scored,
-        going: &dyn Fn() -> bool,
+        proceed: &dyn Fn() -> bool,
     ) -> Result<Option<Found>, DesignError> {
         let (start, path) = self.placed(best);
         let c = &self.constraints;
-        let allowed = |there: &Evaluator| going() && c.keep(there, &path);
+        let allowed = |there: &Evaluator| proceed() && c.keep(there, &path);
         let refined = refine::refine(evaluator, &start, &path, &self.criterion, &self.base.gimbals, &allowed);
         let Some((value, attitudes)) = refined else { return Ok(None) };
         let matrices: Vec<_> = attitudes.iter().map(c_n_f64).collect();

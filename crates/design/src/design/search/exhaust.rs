@@ -412,14 +412,14 @@ impl SequenceSearch<'_> {
         k: usize,
         symmetry: &CandidateSymmetry,
     ) -> Best {
-        let going = || meter.report(0, 0, None);
+        let proceed = || meter.report(0, 0, None);
         let mut traversal = Traversal::new(self, meter, k);
         let mut sequence = Vec::with_capacity(k);
         self.rows.each(
             &candidates(start),
             k,
             true,
-            &mut EnumerationLimits::while_going(&going),
+            &mut EnumerationLimits::without_budget(&proceed),
             &mut |set| {
                 let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
                 sequence.clear();
@@ -439,11 +439,11 @@ impl SequenceSearch<'_> {
     /// search was stopped. Each set is judged once and stored as one bit.
     fn levels(&self, k: usize) -> Option<Vec<Sets>> {
         let meter = Meter::new(self.progress, 1);
-        let going = || meter.report(0, 0, None);
+        let proceed = || meter.report(0, 0, None);
         let candidates = self.rows.candidates();
         let levels: Vec<Sets> = (0..=self.rows.last_order()).map(|_| Sets::none(candidates, k)).collect();
         let judged = |prefix: &[usize], size: usize| {
-            let mut patience = EnumerationLimits::while_going(&going);
+            let mut patience = EnumerationLimits::without_budget(&proceed);
             self.rows.each(prefix, size, false, &mut patience, &mut |set| {
                 let degree = self.only_degree().or_else(|| self.worst(self.rows.degrees(set)));
                 degree.inspect(|&degree| levels[degree].add(set));
@@ -456,8 +456,8 @@ impl SequenceSearch<'_> {
             _ => parallel::all(candidates - first - 1, &|i| judged(&[first, first + 1 + i], size)),
         };
         let sizes = 1..=k.min(candidates);
-        let mut all = sizes.map(|size| parallel::all(candidates, &|first| going() && behind(first, size)));
-        (all.all(|done| done) && going()).then_some(levels)
+        let mut all = sizes.map(|size| parallel::all(candidates, &|first| proceed() && behind(first, size)));
+        (all.all(|done| done) && proceed()).then_some(levels)
     }
 }
 
