@@ -263,7 +263,7 @@ fn every_command_runs_and_prints_what_is_shown() {
 
 /// Deliberate errors in a text are found, and corrected where possible.
 #[test]
-fn a_text_that_is_wrong_is_told() {
+fn a_text_that_is_wrong_is_reported() {
     let of = |text: &str| held("here", text);
     let shown = |lines: &str| format!("```console\n$ printf 'a\\nb\\nc\\n'\n{lines}```\n");
     assert!(of(&shown("a\nb\nc\n")).0.is_empty() && of(&shown("a\n...\n")).0.is_empty());

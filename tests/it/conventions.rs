@@ -192,7 +192,7 @@ fn whole_numbers() {
 
 /// Wrong inputs of every kind: the message gives the place, the expected and the found input, and advice.
 #[test]
-fn wrong_inputs_are_told_with_a_hint() {
+fn wrong_inputs_are_reported_with_a_hint() {
     let (folder, _) = scratch();
     let at = |name: &str| folder.path().join(name).display().to_string();
     std::fs::write(at("file.txt"), "text").expect("written");

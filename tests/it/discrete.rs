@@ -330,7 +330,8 @@ fn all_parts_of_a_model() {
     let text = "name = \"m\"\ndiscrete = true\nparameters = [\"a\"]\n[states]\n\
                 x = { equation = \"a*x\", initial = \"known\" }\n[outputs]\ny = \"x\"\n";
     assert_eq!(degrees(&analyzed(text)), [("a", Some(1))]);
-    // the parameter that two runs share is told from their starts by one; the starts have names of their own
+    // the parameter that two runs share is distinguished from their starts by one; the starts have names of
+    // their own
     let text = "name = \"m\"\ndiscrete = true\nexperiments = 2\nparameters = [\"a\"]\n[states]\nx = \"a*x\"\n\
                 [outputs]\ny = \"x\"\n";
     assert_eq!(degrees(&analyzed(text)), [("x@1", Some(0)), ("x@2", Some(0)), ("a", Some(1))]);

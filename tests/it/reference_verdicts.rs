@@ -75,7 +75,7 @@ fn single_position_at_pole_and_equator_and_with_azimuth() {
 /// choice of a basis. At -90, 0, 0 (D_FY, psi_z) and (D_OY, psi_z) are not observable, hence D_FY = 1, D_OY =
 /// -+1 is not either.
 #[test]
-fn whom_an_unknown_is_not_told_from() {
+fn unknowns_indistinguishable_from_another() {
     let partners = |s: &Scheme| -> BTreeMap<String, BTreeSet<String>> {
         let list = judged(s).quantities;
         list.into_iter().map(|q| (q.name, q.partners.into_iter().collect())).collect()

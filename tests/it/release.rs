@@ -72,14 +72,14 @@ fn links_lead_somewhere() {
             count += 1;
             let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
             let leads = if file.is_empty() { path.clone() } else { path.with_file_name("").join(file) };
-            let told = format!("{}: {target}", path.display());
-            assert!(leads.exists(), "{told} leads nowhere");
-            assert!(anchor.is_empty() || anchors(&read(&leads)).contains(anchor), "{told}: no such heading");
+            let link = format!("{}: {target}", path.display());
+            assert!(leads.exists(), "{link} leads nowhere");
+            assert!(anchor.is_empty() || anchors(&read(&leads)).contains(anchor), "{link}: no such heading");
             // the book contains links to files outside it
             let book = root().join("book/src");
             assert!(
                 !path.starts_with(&book) || file.is_empty() || !file.contains('/'),
-                "{told} leaves the book"
+                "{link} leaves the book"
             );
         }
     }

@@ -602,8 +602,8 @@ fn an_output_to_drop_changes_no_verdict() {
             let higher = pairs.iter().any(|(a, b)| b.1 > a.1);
             if names.contains(&name) {
                 dropped += 1;
-                let told = said.contains("higher order");
-                assert!(lost.is_empty() && fewer == rank && higher == told, "{said}: {without:?}");
+                let reported = said.contains("higher order");
+                assert!(lost.is_empty() && fewer == rank && higher == reported, "{said}: {without:?}");
             } else if said.starts_with("Keep all outputs") {
                 kept += 1;
                 let part =

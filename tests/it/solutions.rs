@@ -98,8 +98,8 @@ fn numbers_of_systems() {
     // the rates are a, b, a + b: only a and b are exchangeable
     assert_eq!(numbers(&counted(&three)), BTreeMap::from([("u", 2), ("v", 2), ("w", 1), ("a", 2), ("b", 2)]));
     // one more output determines a
-    let told = twins.replace("[outputs]\n", "[outputs]\nz = \"a^2\"\n");
-    assert_eq!(numbers(&counted(&told)), BTreeMap::from([("u", 1), ("v", 1), ("a", 1), ("b", 1)]));
+    let with_output = twins.replace("[outputs]\n", "[outputs]\nz = \"a^2\"\n");
+    assert_eq!(numbers(&counted(&with_output)), BTreeMap::from([("u", 1), ("v", 1), ("a", 1), ("b", 1)]));
     // in two experiments with the same rates everything is exchanged together
     let again = counted(&format!("experiments = 2\n{twins}"));
     assert_eq!(numbers(&again).values().copied().collect::<Vec<_>>(), [2; 6]);

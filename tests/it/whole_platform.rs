@@ -331,9 +331,9 @@ fn wrong_use_has_a_reason() {
         analyze(scheme, options, None).expect("an answer").notes.join("\n")
     };
     let cardinal = inertial("K1,K3,Kx,F,II,OO,SS");
-    let told = notes(&cardinal);
+    let stated = notes(&cardinal);
     for part in ["K1 and K3 are not told apart", "Kx is not excited", "are never told apart"] {
-        assert!(told.contains(part), "{told}");
+        assert!(stated.contains(part), "{stated}");
     }
     assert!(
         notes(&Scheme { carry: Carry::Platform, ..inertial("F,GS") })

@@ -406,7 +406,8 @@ pub struct Estimated {
     pub required_sigma: Option<f64>,
     /// Sigma over that with all undetermined unknowns known, dimensionless: above one if the nonlinear model
     /// couples an unknown that stays open within its box to the estimate. Null if not determined.
-    pub held_factor: Option<f64>,
+    #[serde(rename = "held_factor")]
+    pub constrained_factor: Option<f64>,
     /// Part of sigma, in the unit of `unit`, by what the records leave open within its box (see
     /// `assumed.held`): zero if nothing of it bends into the estimate. Null if not determined.
     #[serde(default)]
@@ -802,7 +803,8 @@ pub struct Assumed {
     pub priors: Vec<(String, f64, String)>,
     /// Box of what the records leave open: name of the unknown, one standard deviation in its unit, and that
     /// unit.
-    pub held: Vec<(String, f64, String)>,
+    #[serde(rename = "held")]
+    pub constrained: Vec<(String, f64, String)>,
     /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, drift_noise.
     #[serde(default)]

@@ -152,14 +152,14 @@ impl<S: Scalars> Directions<S> {
     where
         S::Element: 'a,
     {
-        let mut told = self.known(&[]);
+        let mut information = self.known(&[]);
         let zero = self.field.zero();
         for row in rows {
             let entry = |k: usize| self.field.dot(&zero, row.iter().zip(self.units.iter().map(|u| &u[k])));
             let entries: Vec<_> = (0..self.count).map(entry).collect();
-            told.space.insert(&entries);
+            information.space.insert(&entries);
         }
-        told
+        information
     }
 
     /// Unknowns of `open` that become observable by this information and are not given.

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn work_ends_where_it_is_told_to() {
+    fn work_ends_where_it_is_interrupted() {
         let at = Rc::new(Cell::new(0));
         let before = at.clone();
         let ended = hearing(Duration::ZERO, move || before.get() < 5, || count(100, &at));

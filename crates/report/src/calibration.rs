@@ -38,11 +38,11 @@ fn left_open(c: &Calibration) -> Option<String> {
 }
 
 /// Factor of sigma from which the effect of unknowns that are left open is printed.
-const HELD: f64 = 1.05;
+const CONSTRAINED: f64 = 1.05;
 
 /// Verdict on an unknown: the source of its estimate, or the reason why there is none.
 fn verdict(e: &Estimated) -> String {
-    let bent = e.open_sigma.filter(|_| e.determined && e.held_factor.is_some_and(|f| f > HELD));
+    let bent = e.open_sigma.filter(|_| e.determined && e.constrained_factor.is_some_and(|f| f > CONSTRAINED));
     match (e.determined, e.degree) {
         (true, _) if e.from_prior => "estimated from a stated prior and the record".into(),
         (true, _) if bent.is_some() => {
@@ -297,13 +297,13 @@ fn mode(c: &Calibration) -> Vec<String> {
             listed(&c.assumed.priors)
         )
     }];
-    if !c.assumed.held.is_empty() {
+    if !c.assumed.constrained.is_empty() {
         out.push(format!(
             "Left open: {} (box of 1 sigma about the first estimate; a truth of k boxes bends up to k^2 \
              times as much into the others).",
-            listed(&c.assumed.held)
+            listed(&c.assumed.constrained)
         ));
-        let shows = |e: &&Estimated| e.determined && e.held_factor.is_some_and(|f| f > HELD);
+        let shows = |e: &&Estimated| e.determined && e.constrained_factor.is_some_and(|f| f > CONSTRAINED);
         let all: Vec<String> = c
             .quantities
             .iter()
@@ -312,7 +312,7 @@ fn mode(c: &Calibration) -> Vec<String> {
             .map(|e| format!("{} +-{} {}", e.name, number(e.open_sigma.unwrap_or(0.0)), e.unit))
             .collect();
         out.push(if all.is_empty() {
-            format!("What is left open adds at most {:.0} % to any sigma.", 100.0 * (HELD - 1.0))
+            format!("What is left open adds at most {:.0} % to any sigma.", 100.0 * (CONSTRAINED - 1.0))
         } else {
             format!(
                 "What is left open bends into these estimates (1 sigma, in their sigmas): {}. Smaller priors \

@@ -202,8 +202,8 @@ fn force_differs(of: &str, least: &ForceLength, most: &ForceLength, causes: &[Fo
         );
     }
     let each: Vec<String> = causes.iter().map(cause).collect();
-    let told = if causes.len() > 1 { " (these positions do not tell which)" } else { "" };
-    format!("{lengths}: {}{told}, which no unknown of the scheme explains", each.join(", or "))
+    let ambiguous = if causes.len() > 1 { " (these positions do not tell which)" } else { "" };
+    format!("{lengths}: {}{ambiguous}, which no unknown of the scheme explains", each.join(", or "))
 }
 
 /// Column and lines of cells.

@@ -74,20 +74,21 @@ mod tests {
         for _ in 0..2000 {
             let bound = 10f64.powf(9.0 * draw() - 6.0);
             let value = bound * (1.0 + 10f64.powf(7.0 * draw() - 6.0));
-            let told = Excess::new(value, bound, 100.0 * (value / bound - 1.0));
+            let stated = Excess::new(value, bound, 100.0 * (value / bound - 1.0));
             let of = |figure: &str| figure.parse::<f64>().expect("a number");
-            let percent = told.percent.strip_suffix(" %").expect("a percentage");
-            let of_figures = 100.0 * (of(&told.value) / of(&told.bound) - 1.0);
+            let percent = stated.percent.strip_suffix(" %").expect("a percentage");
+            let of_figures = 100.0 * (of(&stated.value) / of(&stated.bound) - 1.0);
             let decimals = percent.split_once('.').map_or(0, |(_, d)| d.len() as i32);
             let unit = 10f64.powi(-decimals);
             assert!(
-                of(&told.bound) <= bound * (1.0 + 1e-14) && (of(&told.value) / value - 1.0).abs() < 5.1e-6,
-                "{told:?} {value} {bound}"
+                of(&stated.bound) <= bound * (1.0 + 1e-14)
+                    && (of(&stated.value) / value - 1.0).abs() < 5.1e-6,
+                "{stated:?} {value} {bound}"
             );
-            assert!(of(percent) >= of_figures - 1e-6 * unit - 1e-9, "{told:?} {of_figures}");
+            assert!(of(percent) >= of_figures - 1e-6 * unit - 1e-9, "{stated:?} {of_figures}");
             // below 0.001 % six digits are too few: the known excess counts
             let most = of_figures.max(100.0 * (value / bound - 1.0)).max(1e-6);
-            assert!(of(percent) <= most + unit * 1.001, "{told:?} {of_figures}");
+            assert!(of(percent) <= most + unit * 1.001, "{stated:?} {of_figures}");
         }
         let of = |value: f64, bound: f64| {
             let Excess { value, bound, percent } = Excess::new(value, bound, 100.0 * (value / bound - 1.0));

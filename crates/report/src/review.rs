@@ -293,8 +293,8 @@ fn appendix(
     id: &str,
 ) -> Vec<(&'static str, Vec<DocumentBlock>)> {
     let a = &s.analysis;
-    let mut told_apart = Vec::new();
-    null_space(&mut told_apart, a);
+    let mut indistinguishable = Vec::new();
+    null_space(&mut indistinguishable, a);
     let mut assumed = words::assumptions(a);
     // carry, latitude and observation are stated above
     assumed
@@ -310,7 +310,7 @@ fn appendix(
     valid.extend(compare::at_own_drifts(std::slice::from_ref(review)));
     vec![
         ("Unknowns", vec![unknowns(a, review), pictures::staircase(a, &format!("{id}_staircase"))]),
-        ("What cannot be told apart", told_apart),
+        ("What cannot be told apart", indistinguishable),
         ("Positions in numbers", numbers(s, coefficients, review, id)),
         ("How each is solved", solved(a)),
         ("Sensitivity", sensitivity(s, review, id)),

@@ -22,7 +22,9 @@ fn explanation(q: &SystemQuantity, constrained: bool) -> String {
             format!("from {from} themselves; {}", solutions(q))
         }
         (Status::Observable, _) => solutions(q),
-        (Status::Inseparable, _) => format!("not identifiable: {}", words::not_told_from(&q.partners)),
+        (Status::Inseparable, _) => {
+            format!("not identifiable: {}", words::indistinguishable_from(&q.partners))
+        }
         (Status::NotExcited, _) => "not identifiable: moves no output".into(),
         (Status::NotSeen, _) => "a higher order may still solve it: no end is proven here".into(),
     }

@@ -74,7 +74,7 @@ pub(crate) fn rank(a: &Analysis) -> String {
 }
 
 /// `not told from D_FZ, D_OY`; a long list is cut and says so (JSON and CSV have all of it).
-pub(crate) fn not_told_from(partners: &[String]) -> String {
+pub(crate) fn indistinguishable_from(partners: &[String]) -> String {
     const SHOWN: usize = 8;
     let more = partners.len().saturating_sub(SHOWN);
     let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
@@ -85,7 +85,7 @@ pub(crate) fn not_told_from(partners: &[String]) -> String {
 pub(crate) fn explanation(q: &Quantity) -> String {
     let mut out = match (&q.solution, q.status) {
         (Some(s), _) => s.text.clone(),
-        (None, Status::Inseparable) => not_told_from(&q.partners),
+        (None, Status::Inseparable) => indistinguishable_from(&q.partners),
         _ => String::new(),
     };
     if let Some(e) = &q.elsewhere {

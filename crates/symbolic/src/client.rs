@@ -334,7 +334,7 @@ mod tests {
     const READY: &str = r#"echo 'obsdeg:"ready"'; read line; "#;
 
     #[test]
-    fn answers_are_told_from_the_banner() {
+    fn answers_are_distinguished_from_the_banner() {
         let answer = r#"echo banner; echo 'obsdeg:{"values":{"values":["x"],"verified":true}}'"#;
         let mut worker = scripted(&format!("echo banner; {READY} {answer}; read line; {answer}"));
         for _ in 0..2 {
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn crashes_and_nonsense_are_told_and_stay() {
+    fn crashes_and_nonsense_are_reported_and_stay() {
         let garbled = |found: &str| WorkerError::Garbled { found: found.into() };
         for (script, expected) in [
             ("exit 3", WorkerError::Ended),
@@ -380,7 +380,7 @@ mod tests {
 
     /// Work beyond the limit ends the process, and the next request starts another.
     #[test]
-    fn work_beyond_the_limit_is_told_each_time() {
+    fn work_beyond_the_limit_is_reported_each_time() {
         let mut worker = scripted(&format!("{READY} echo 'obsdeg:\"over_limit\"'; exec sleep 60"));
         for _ in 0..2 {
             assert_eq!(worker.ask(&request()), Err(WorkerError::OverLimit { limit: u64::MAX }));

@@ -61,8 +61,8 @@ mod tests {
         let path = folder.path().join("lock");
         let (first, second) = (open(&path).expect("created"), open(&path).expect("opened"));
         wait(&first, || panic!("nobody holds it")).expect("locked");
-        let told = wait(&second, || Err(Error::other("it is held")));
-        assert_eq!(told.expect_err("held").to_string(), "it is held");
+        let refused = wait(&second, || Err(Error::other("it is held")));
+        assert_eq!(refused.expect_err("held").to_string(), "it is held");
         drop(first);
         wait(&second, || panic!("nobody holds it")).expect("locked");
     }

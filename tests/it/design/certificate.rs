@@ -359,7 +359,7 @@ fn cardinal_attitudes_cost_a_factor_at_nine_and_24_positions() {
 fn cardinal_attitudes_cost(known: &[(usize, f64, f64, f64)]) {
     let grid = Candidates::grid(45_000_000_000).expect("a grid");
     for &(k, cardinal, of_grid, bound) in known {
-        let near = |found: f64, told: f64| (found - told).abs() < 0.6e-5;
+        let near = |found: f64, expected: f64| (found - expected).abs() < 0.6e-5;
         let found = of_d(k, Candidates::cardinals(), 30);
         assert!(near(found.found[0].value, cardinal), "{k}: {}", found.found[0].value);
         let certificate = found.search.and_then(|s| s.certificate).expect("a certificate");
@@ -424,10 +424,10 @@ fn all_attitudes_have_a_bound() {
     let grid = Candidates::grid(45_000_000_000).expect("a grid");
     let start = evaluator_of(Carry::Reset, &grid);
     // independent computation at nine, 24 and twelve positions
-    let bounds = [(9, 0.00086), (24, 0.00053), (12, 0.00075)].map(|(k, told)| {
+    let bounds = [(9, 0.00086), (24, 0.00053), (12, 0.00075)].map(|(k, expected)| {
         let every = start.everywhere(&Criterion::D, k, &|| true).expect("a bound");
         assert!(every.value <= every.attained && every.attained < every.value * 1.02, "{k} {every:?}");
-        assert!((every.attained - told).abs() < 0.6e-5, "{k} {every:?}");
+        assert!((every.attained - expected).abs() < 0.6e-5, "{k} {every:?}");
         (k, every)
     });
     let [.., (k, every)] = bounds;

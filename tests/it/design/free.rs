@@ -106,8 +106,8 @@ impl DesignPair {
         // better in the order of the search, where a smaller degree comes first
         let key = |f: &Found| (f.worst_degree, f.value);
         assert!(key(first) <= (cardinal.worst_degree, cardinal.value * (1.0 + 1e-12)), "{task} {cardinal:?}");
-        let reaches = |value: Option<f64>, told: f64, within: f64| {
-            assert!(value.is_none_or(|v| (v / told - 1.0).abs() < within), "{task}: {value:?} {told}");
+        let reaches = |value: Option<f64>, stated: f64, within: f64| {
+            assert!(value.is_none_or(|v| (v / stated - 1.0).abs() < within), "{task}: {value:?} {stated}");
             value.is_some()
         };
         let once = |n: usize| vec![1.0; n];
@@ -170,14 +170,17 @@ fn without_psi(criterion: &Criterion) -> Criterion {
 
 fn free_attitudes_are_never_worse(tasks: impl Iterator<Item = (CriterionName, &'static str, usize, i64)>) {
     let mut rng = SplitMix64::new(29);
-    let mut told = [0; 3];
+    let mut stated = [0; 3];
     let mut count = 0;
     for (criterion, terms, k, step) in tasks {
         let checked = both(criterion, terms, k, step, &mut rng).check(step as f64 / 1e9);
-        told.iter_mut().zip(checked).for_each(|(sum, checked)| *sum += usize::from(checked));
+        stated.iter_mut().zip(checked).for_each(|(sum, checked)| *sum += usize::from(checked));
         count += 1;
     }
-    assert!(told[0] * 10 >= count * 8 && told[1] > 0 && told[2] * 10 >= count * 5, "{told:?} of {count}");
+    assert!(
+        stated[0] * 10 >= count * 8 && stated[1] > 0 && stated[2] * 10 >= count * 5,
+        "{stated:?} of {count}"
+    );
 }
 
 /// Two random tasks: the first criterion, angles in steps of 5 and of 7 degrees.

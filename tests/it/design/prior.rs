@@ -61,7 +61,7 @@ fn sigmas_are_those_of_all_samples_and_the_prior() {
     let mut rng = SplitMix64::new(31);
     let mut between =
         |low: f64, high: f64| low + (high - low) * (rng.below(1 << 30) as f64 / f64::from(1 << 30));
-    let (mut compared, mut told) = (0, 0);
+    let (mut compared, mut lowered) = (0, 0);
     for (terms, carry, slew) in [
         ("F,I,O,S", Carry::Platform, None),
         ("F,I,O,S", Carry::Inertial, None),
@@ -111,11 +111,11 @@ fn sigmas_are_those_of_all_samples_and_the_prior() {
                 compared += 1;
             }
             // the prior lowers some sigma by at least 10 %
-            told +=
+            lowered +=
                 usize::from(without.is_empty() || without.iter().zip(&found).any(|(a, b)| b < &(a * 0.9)));
         }
     }
-    assert!(compared > 300 && told == 24, "{compared} {told}");
+    assert!(compared > 300 && lowered == 24, "{compared} {lowered}");
 }
 
 /// The sigma that a design promises is that of the filter at the end of a run. Its result is the best of all

@@ -116,7 +116,7 @@ fn what_would_be_searched_for_minutes_is_certified() {
 /// Weights over all attitudes list every attitude once, with angles in the usual ranges, and attain the
 /// stated criterion by the equations.
 #[test]
-fn weights_over_all_attitudes_are_told_once() {
+fn weights_over_all_attitudes_are_reported_once() {
     let candidates = twelve();
     let base = Scheme { latitude: "45".parse().ok(), ..base(Carry::Reset) };
     let evaluator = Evaluator::new(&base, &candidates.attitudes, &(0..12).collect::<Vec<_>>(), &quiet());
@@ -151,11 +151,14 @@ fn weights_over_all_attitudes_are_told_once() {
         ..options(Some(17))
     };
     let found = design(&base, &quiet(), &some, &on).expect("designed");
-    let told = found.search.and_then(|s| s.certificate).and_then(|c| c.everywhere).expect("a bound");
-    assert_eq!((told.weights.len(), told.weights.len() + told.lighter), (10, every.support.len()));
-    let names: BTreeSet<&String> = told.weights.iter().map(|w| &w.candidate).collect();
+    let reported = found.search.and_then(|s| s.certificate).and_then(|c| c.everywhere).expect("a bound");
+    assert_eq!(
+        (reported.weights.len(), reported.weights.len() + reported.lighter),
+        (10, every.support.len())
+    );
+    let names: BTreeSet<&String> = reported.weights.iter().map(|w| &w.candidate).collect();
     assert_eq!(names.len(), 10);
-    let listed: f64 = told.weights.iter().map(|w| w.weight).sum();
-    assert!((listed + told.lighter_weight - sum).abs() < 1e-9);
-    assert!(told.attained == every.attained && told.best_possible == every.value);
+    let listed: f64 = reported.weights.iter().map(|w| w.weight).sum();
+    assert!((listed + reported.lighter_weight - sum).abs() < 1e-9);
+    assert!(reported.attained == every.attained && reported.best_possible == every.value);
 }

@@ -45,12 +45,12 @@ fn what_would_do_does() {
     let without: Vec<&str> = without.into_iter().filter(|o| *o != "--meet").collect();
     let best = json(&without);
     let worst = &best["found"][0]["requirements"]["worst"];
-    let told = between(&message, "requirements met, worst margin ", "\n");
-    let (margin, name) = told.split_once(' ').expect("a margin and a name");
+    let margin_and_name = between(&message, "requirements met, worst margin ", "\n");
+    let (margin, name) = margin_and_name.split_once(' ').expect("a margin and a name");
     let (margin, least): (f64, f64) =
         (margin.parse().expect("a number"), worst["margin"].as_f64().expect("a number"));
-    assert!(margin <= least + 1e-4 && margin > 0.8 * least && margin < 1.0, "{told} {worst}");
-    assert!(name.starts_with("(D_") || name.starts_with("(psi"), "{told}");
+    assert!(margin <= least + 1e-4 && margin > 0.8 * least && margin < 1.0, "{margin_and_name} {worst}");
+    assert!(name.starts_with("(D_") || name.starts_with("(psi"), "{margin_and_name}");
     assert_eq!(nearest.split(' ').count(), 5);
     // the suggested dwell suffices for this scheme; one shorter by two percent does not
     let met = |arguments: &[&str]| {

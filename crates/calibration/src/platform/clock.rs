@@ -5,7 +5,7 @@ use obsdeg_evidence::simulation::{Plan, SegmentKind};
 use crate::answer::ClockRate;
 
 /// Smallest difference of durations that is significant, in intervals between samples.
-const TOLD: f64 = 4.0;
+const SIGNIFICANT: f64 = 4.0;
 
 /// Straight line of the times of a record over those of the scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,10 +74,11 @@ pub(crate) fn by_durations(
         each.flat_map(|(scheme, stay)| [(scheme.0, stay.0), (scheme.1, stay.1)]).collect();
     let line = line(&points)?;
     let whole = points.last()?.0 - points.first()?.0;
-    let explains = line.within <= TOLD / 2.0 * between;
+    let explains = line.within <= SIGNIFICANT / 2.0 * between;
     let of = |width: f64| width / 12f64.sqrt();
     let sigma = of(between) * line.sigma;
-    let far = || (line.fast.abs() * whole > TOLD * between).then_some(ClockRate { fast: line.fast, sigma });
+    let far =
+        || (line.fast.abs() * whole > SIGNIFICANT * between).then_some(ClockRate { fast: line.fast, sigma });
     let middle =
         |(low, high): (f64, f64)| ClockRate { fast: (low + high) / 2.0, sigma: sigma.max(of(high - low)) };
     if explains { inside.map(middle).or_else(far) } else { None }
@@ -92,8 +93,8 @@ pub(crate) fn of_turns(stays: &[(f64, f64)], between: f64, slews: &[f64]) -> Opt
     let points: Vec<(f64, f64)> = each.collect();
     let line = line(&points)?;
     let ends = points.iter().fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), p| (a.min(p.0), b.max(p.0)));
-    let explains = line.within <= TOLD / 2.0 * between;
-    (explains && line.fast.abs() * (ends.1 - ends.0) > TOLD * between).then_some(1.0 + line.fast)
+    let explains = line.within <= SIGNIFICANT / 2.0 * between;
+    (explains && line.fast.abs() * (ends.1 - ends.0) > SIGNIFICANT * between).then_some(1.0 + line.fast)
 }
 
 #[cfg(test)]

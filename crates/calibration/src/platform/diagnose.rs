@@ -417,7 +417,7 @@ impl AnswerData<'_> {
             Some((mean, _)) => problem.values(&problem.moved(&self.estimate.at.x, mean)),
             None => problem.values(&self.estimate.at.x),
         };
-        let tight = problem.step_held(&self.estimate.at, TIGHT)?;
+        let tight = problem.step_constrained(&self.estimate.at, TIGHT)?;
         let planned: LinearisedRuns = problem.at(at_rest)?;
         let planned = problem.step(&planned, WEAK)?;
         let none = || DMatrix::zeros(0, problem.unknowns.n);
@@ -437,9 +437,9 @@ impl AnswerData<'_> {
         let scale = si_per_shown(a.unit);
         let there = |x: f64| a.stands().then_some(x);
         let sigma = self.estimate.solution.sigma(&a.local);
-        let (linear, held) = (self.linear.sigma(&a.local), by.tight.sigma(&a.local));
+        let (linear, constrained) = (self.linear.sigma(&a.local), by.tight.sigma(&a.local));
         let moved: f64 = a.local.iter().map(|&(i, k)| k * by.with_prior.x[i]).sum();
-        let open = (sigma * sigma - held * held).max(0.0).sqrt();
+        let open = (sigma * sigma - constrained * constrained).max(0.0).sqrt();
         Estimated {
             name: a.name.clone(),
             unit: shown_unit(a.unit).into(),
@@ -453,7 +453,7 @@ impl AnswerData<'_> {
             sigma_rescaled: there(self.between(a, a, by).max(0.0).sqrt()),
             predicted_sigma: there(by.planned.sigma(&a.planned) / scale),
             required_sigma: self.required(&a.name),
-            held_factor: there(sigma / held),
+            constrained_factor: there(sigma / constrained),
             open_sigma: there(open / scale),
             from_prior: a.stands() && a.from_prior,
             prior_shift: there(moved / linear).filter(|_| data_alone),
@@ -673,7 +673,7 @@ impl AnswerData<'_> {
     fn assumed(&self, unknowns: &[ReportedFunctional]) -> Assumed {
         let c = self.conditions;
         let open = unknowns.iter().filter(|a| !a.determined);
-        let held = open.map(|a| {
+        let constrained = open.map(|a| {
             let width = BOX * self.problem.unknowns.prior[a.terms[0].0] / si_per_shown(a.unit);
             (a.name.clone(), width, shown_unit(a.unit).to_string())
         });
@@ -693,7 +693,7 @@ impl AnswerData<'_> {
                 let differs = if before.of.terms == own.terms { None } else { Some(before.of.terms.clone()) };
                 differs.map(|terms| format!("terms {terms} instead of {}", own.terms)).into_iter().collect()
             }),
-            held: held.collect(),
+            constrained: constrained.collect(),
             by_default: self.chosen(),
             seed: self.options.seed,
         }

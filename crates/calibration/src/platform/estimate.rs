@@ -168,7 +168,7 @@ impl RunUnknowns {
 
     /// Rows that constrain the loose directions within `width` times the prior, with the least information
     /// that does so, and rows of the biases and the stated priors.
-    pub(super) fn holding(&self, width: f64) -> DMatrix<f64> {
+    pub(super) fn constraint_rows(&self, width: f64) -> DMatrix<f64> {
         let weighted =
             DMatrix::from_fn(self.n, self.loose.ncols(), |i, j| self.loose[(i, j)] / self.prior[i]);
         let q = if weighted.ncols() == 0 { weighted } else { weighted.qr().q() };
@@ -256,7 +256,7 @@ impl PlatformProblem<'_> {
         let information =
             runs.iter().map(|(run, _)| StartInformation::of(run)).collect::<Result<Vec<_>, EkfError>>()?;
         let mut cost: f64 = information.iter().map(StartInformation::at_zero).sum();
-        cost += self.held(&self.unknowns.holding(BOX), &x).norm_squared();
+        cost += self.constraint_residuals(&self.unknowns.constraint_rows(BOX), &x).norm_squared();
         if let Some((rows, _)) = &self.known {
             cost += self.known_left(rows, &x).norm_squared();
         }
@@ -281,7 +281,7 @@ impl PlatformProblem<'_> {
     }
 
     /// Residuals at `x` of the rows that constrain unknowns about their first estimates.
-    pub(super) fn held(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
+    pub(super) fn constraint_residuals(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
         rows * self.unknowns.to_first(x)
     }
 
@@ -296,7 +296,7 @@ impl PlatformProblem<'_> {
     }
 
     /// Next step from `at`, with the undetermined directions constrained within `width` times their prior.
-    pub(crate) fn step_held(
+    pub(crate) fn step_constrained(
         &self,
         at: &LinearisedRuns,
         width: f64,
@@ -347,8 +347,8 @@ impl PlatformProblem<'_> {
             }
             rows.add(&wide, &information.right);
         }
-        let holding = self.unknowns.holding(width);
-        rows.add(&holding, &self.held(&holding, &at.x));
+        let constraint_rows = self.unknowns.constraint_rows(width);
+        rows.add(&constraint_rows, &self.constraint_residuals(&constraint_rows, &at.x));
         if let Some((known, _)) = &self.known {
             rows.add(known, &self.known_left(known, &at.x));
         }

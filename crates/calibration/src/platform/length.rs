@@ -186,7 +186,7 @@ mod tests {
     ];
 
     #[test]
-    fn what_is_wrong_is_told() {
+    fn wrong_lengths_are_reported() {
         assert_eq!(found(&lengths([0.0; 3], [0.0; 3], &SIX)), None);
         // gravity by a tenth of what is doubted, and four times it
         assert_eq!(found(&lengths([3e-5; 3], [0.0; 3], &SIX)), None);
@@ -218,7 +218,7 @@ mod tests {
 
     /// If y is vertical throughout, its scale explains the lengths as well as a common one.
     #[test]
-    fn what_is_not_told_is_not() {
+    fn an_ambiguous_cause_stays_ambiguous() {
         let two = found(&lengths([0.0, 5e-4, 0.0], [0.0; 3], &[[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]));
         let two = two.expect("wrong");
         let [cause] = &two.causes[..] else { panic!("{two:?}") };

@@ -95,7 +95,7 @@ impl PlatformProblem<'_> {
         }
         let none = DMatrix::zeros(0, self.unknowns.n);
         let known = self.known.as_ref().map_or(none, |(rows, _)| rows.clone());
-        let beside = [self.unknowns.holding(BOX), known];
+        let beside = [self.unknowns.constraint_rows(BOX), known];
         let information = self.slope(&all, &beside, &estimate.at);
         let symmetric = (&information + information.transpose()) / 2.0;
         Ok(symmetric.cholesky().map(|root| Equation { weighted: all, beside, root }))
@@ -120,9 +120,9 @@ impl PlatformProblem<'_> {
 
     /// `J^T r(x)`, with J that of the estimate.
     fn pull(&self, of: &Equation, at: &LinearisedRuns) -> DVector<f64> {
-        let [held, known] = &of.beside;
-        let mut out =
-            held.transpose() * self.held(held, &at.x) + known.transpose() * self.known_left(known, &at.x);
+        let [constraining, known] = &of.beside;
+        let mut out = constraining.transpose() * self.constraint_residuals(constraining, &at.x)
+            + known.transpose() * self.known_left(known, &at.x);
         for (((run, _), weighted), index) in at.runs.iter().zip(&of.weighted).zip(&self.unknowns.index) {
             let own = weighted.transpose() * DVector::from_column_slice(&run.residuals);
             index.iter().enumerate().for_each(|(a, &i)| out[i] += own[a]);

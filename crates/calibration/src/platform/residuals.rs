@@ -8,7 +8,7 @@ use super::diagnose::{AnswerData, MeasurementResidual};
 use super::placed::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 
-/// Fewest residuals of a position whose correlation with the temperature is told.
+/// Fewest residuals of a position whose correlation with the temperature is reported.
 const FEWEST_WARM: usize = 10;
 /// Most points of a series.
 const POINTS: usize = 1000;

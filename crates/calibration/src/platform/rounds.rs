@@ -104,11 +104,12 @@ impl CalibrationInputs<'_> {
         let (n, coefficients, biases) =
             (planned.unknowns(), planned.platform.coefficients(), planned.biases.len());
         // priors that a prior calibration already includes do not count again
-        let held = |name: &String| {
+        let included = |name: &String| {
             before.is_some_and(|b| b.priors.contains(name) && b.estimates.names.contains(name))
         };
-        let counts =
-            |name: &String| self.own.stated_priors().iter().any(|a| concerns(&a.name, name)) && !held(name);
+        let counts = |name: &String| {
+            self.own.stated_priors().iter().any(|a| concerns(&a.name, name)) && !included(name)
+        };
         let stated: Vec<bool> =
             planned.platform.names().iter().map(counts).chain(std::iter::repeat_n(false, biases)).collect();
         let mut unknowns = RunUnknowns::new(

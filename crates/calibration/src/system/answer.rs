@@ -325,7 +325,7 @@ pub enum SystemCalibrationError {
         "the prior calibration knows {found} as constraints make them, which the model has not; expected the \
          same `constraints`"
     )]
-    PriorHeld {
+    PriorConstrained {
         /// Unknowns of the model that the prior calibration constrains.
         found: String,
     },
@@ -334,7 +334,7 @@ pub enum SystemCalibrationError {
         "the constraint {constraint} does not hold anywhere near one of {starts} starts; expected \
          constraints that hold at once, and values under [simulation.values] near the solution"
     )]
-    Unheld {
+    ConstraintUnmet {
         /// Number of starts that were tried.
         starts: usize,
         /// First constraint that does not hold.

@@ -8,7 +8,7 @@ use super::fit::{SystemProblem, size};
 use crate::answer::CovarianceTable;
 
 /// Relative variance, by the trace, below which a direction counts as constrained by the prior calibration.
-const HELD: f64 = 1e-14;
+const CONSTRAINED: f64 = 1e-14;
 
 /// Rows and values of the information of `table` on the free unknowns `names` of `problem`, with unit errors.
 /// Along directions that the prior calibration had constrained and the model constrains too, the prior adds
@@ -32,7 +32,7 @@ pub(super) fn said_before(
     }
     let bound = || {
         let names: Vec<&str> = found.iter().map(|&(k, _)| table.names[k].as_str()).collect();
-        SystemCalibrationError::PriorHeld { found: names.join(", ") }
+        SystemCalibrationError::PriorConstrained { found: names.join(", ") }
     };
     let m = found.len();
     let mut x = DVector::from_iterator(names.len(), problem.free.iter().map(|&i| base[i]));
@@ -53,15 +53,15 @@ pub(super) fn said_before(
     if directions.ncols() > 0 {
         let along = (directions.transpose() * &p * &directions).symmetric_eigen();
         for (k, value) in along.eigenvalues.iter().enumerate() {
-            if *value <= HELD * whole {
-                let held = &directions * along.eigenvectors.column(k);
-                p += &held * held.transpose();
+            if *value <= CONSTRAINED * whole {
+                let constrained = &directions * along.eigenvectors.column(k);
+                p += &constrained * constrained.transpose();
             }
         }
     }
     let diagonal = p.diagonal();
     let root = Cholesky::new(p).ok_or_else(bound)?.l();
-    if (0..m).any(|i| root[(i, i)].powi(2) <= HELD * diagonal[i]) {
+    if (0..m).any(|i| root[(i, i)].powi(2) <= CONSTRAINED * diagonal[i]) {
         return Err(bound());
     }
     let rows = DMatrix::from_fn(m, names.len(), |i, j| if found[i].1 == j { 1.0 / sizes[i] } else { 0.0 });

@@ -61,7 +61,7 @@ impl SystemProblem<'_> {
     ///
     /// # Errors
     /// Index of the constraint with the largest residual.
-    pub(super) fn held(
+    pub(super) fn on_constraints(
         &self,
         base: &DVector<f64>,
         mut x: DVector<f64>,

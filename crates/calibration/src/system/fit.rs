@@ -256,7 +256,7 @@ pub(super) enum Stuck {
     /// The model gives no finite numbers.
     Numbers(EkfError),
     /// The constraint of this index does not hold.
-    Held(usize),
+    Constraint(usize),
 }
 
 impl From<EkfError> for Stuck {
@@ -290,7 +290,7 @@ pub(super) fn settle(
         }
         Ok(at)
     };
-    x = problem.held(base, x, fixed).map_err(Stuck::Held)?;
+    x = problem.on_constraints(base, x, fixed).map_err(Stuck::Constraint)?;
     let mut at = there(problem, &x)?;
     let mut cost = at.cost();
     // an initial pull much weaker than the data
@@ -301,7 +301,7 @@ pub(super) fn settle(
             break;
         }
         let solution = step(&at, &x, pull)?;
-        let moved = problem.held(base, &x + &solution.x, fixed).ok();
+        let moved = problem.on_constraints(base, &x + &solution.x, fixed).ok();
         let next = moved.and_then(|moved| Some((there(problem, &moved).ok()?, moved)));
         let next = next.filter(|(n, _)| n.cost_by(&at.sigmas) <= cost * (1.0 + 1e-12));
         let scale = (cost / at.sigmas.len() as f64).max(1.0).sqrt();

@@ -301,8 +301,8 @@ impl<'a> Calibrating<'a> {
     fn stuck(&self, e: Stuck, tried: usize) -> SystemCalibrationError {
         match e {
             Stuck::Numbers(reason) => nowhere(tried)(reason),
-            Stuck::Held(i) => {
-                SystemCalibrationError::Unheld { starts: tried, constraint: self.constraint(i) }
+            Stuck::Constraint(i) => {
+                SystemCalibrationError::ConstraintUnmet { starts: tried, constraint: self.constraint(i) }
             }
         }
     }

@@ -135,7 +135,7 @@ const BOX: f64 = 2.0;
 fn outside(bench: &Bench, c: &Calibration) -> bool {
     let far =
         |(name, width, _): &(String, f64, String)| truth(bench, name).is_some_and(|x| x.abs() > BOX * width);
-    c.assumed.held.iter().any(far)
+    c.assumed.constrained.iter().any(far)
 }
 
 /// True value of a quantity in the unit of the answer; `None` if the bench has none.
@@ -236,7 +236,7 @@ fn run(case: &Case, seeds: std::ops::Range<u64>) -> Outcome {
         out.unsettled += usize::from(c.findings.iter().any(|f| matches!(f, Finding::NotSettled)));
         let open = c.quantities.iter().chain(&c.combinations).filter(|e| e.left_open).count();
         out.open += usize::from(open > 0);
-        out.boxed |= !c.assumed.held.is_empty();
+        out.boxed |= !c.assumed.constrained.is_empty();
         if outside(&bench, &c) {
             out.outside += 1;
             continue;

@@ -282,7 +282,7 @@ fn a_step_is_no_row_of_outliers() {
 #[test]
 fn a_clock_is_named() {
     let slower = bench().drift.map(|d| d.map(|x| 0.1 * x));
-    let mut told = 0;
+    let mut reported = 0;
     for (fast, drift) in [(0.01, bench().drift), (-0.01, bench().drift), (0.01, slower), (0.03, slower)] {
         let bench = Bench { drift, ..bench() };
         let c = of_csv(&bench, "F,I,O,S", csv(&by_clock(&bench, fast))).expect("calibrated");
@@ -297,12 +297,12 @@ fn a_clock_is_named() {
         let earth = clock.by_earth.as_ref().expect("seen");
         assert!((earth.fast - fast).abs() < 3.5 * earth.sigma && earth.sigma < 0.008, "{clock:?}");
         assert_eq!(by_earth.is_some(), earth.fast.abs() > 3.29 * earth.sigma, "{clock:?}");
-        told += usize::from(by_earth.is_some());
+        reported += usize::from(by_earth.is_some());
         // drifts are too small by that fraction
         let d = c.quantities.iter().find(|u| u.name == "D_FY").expect("there").estimate.expect("determined");
         assert!((d / drift[0][1] * (1.0 + fast) - 1.0).abs() < 0.7 * fast.abs(), "{d}");
     }
-    assert!(told >= 1);
+    assert!(reported >= 1);
     // a scheme with positions 2 % shorter than they were held
     let mut held = bench();
     held.positions.iter_mut().for_each(|p| p.2 = 980.0);
@@ -725,11 +725,11 @@ fn what_is_held_is_said() {
     for combination in c.combinations.iter().filter(|e| e.determined) {
         let part =
             |h: &&(String, f64, String)| combination.name.contains(&h.0) && !free.contains(&h.0.as_str());
-        free.push(&c.assumed.held.iter().find(part).expect("an open unknown").0);
+        free.push(&c.assumed.constrained.iter().find(part).expect("an open unknown").0);
     }
-    assert_eq!(c.assumed.held.len() - free.len(), 7, "{:?}", c.assumed.held);
+    assert_eq!(c.assumed.constrained.len() - free.len(), 7, "{:?}", c.assumed.constrained);
     let mut own = conditions(&bench);
-    let known = c.assumed.held.iter().filter(|h| !free.contains(&h.0.as_str()));
+    let known = c.assumed.constrained.iter().filter(|h| !free.contains(&h.0.as_str()));
     own.priors = known.map(|h| Assignment { name: h.0.clone(), value: 1e-6 }).collect();
     let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text))).expect("a record");
     let known = calibrate(&scheme(&bench, "F,I,O,S"), &own, vec![record], &Options::default(), &|_| true)
@@ -737,10 +737,15 @@ fn what_is_held_is_said() {
     let mut largest: f64 = 1.0;
     for (u, v) in c.quantities.iter().zip(&known.quantities).filter(|(u, _)| u.determined) {
         let (s, t, factor) =
-            (u.sigma.expect("there"), v.sigma.expect("there"), u.held_factor.expect("there"));
+            (u.sigma.expect("there"), v.sigma.expect("there"), u.constrained_factor.expect("there"));
         // the attitudes of the two differ within the box
         assert!((0.9..1.1).contains(&(s / t / factor)), "{}: {s} {t} {factor}", u.name);
-        assert!((v.held_factor.expect("there") - 1.0).abs() < 1e-3, "{}: {:?}", v.name, v.held_factor);
+        assert!(
+            (v.constrained_factor.expect("there") - 1.0).abs() < 1e-3,
+            "{}: {:?}",
+            v.name,
+            v.constrained_factor
+        );
         largest = largest.max(factor);
     }
     assert!(largest > 2.0, "{largest}");

@@ -87,7 +87,7 @@ fn a_spike_does_not_hide_in_its_own_sigma() {
 /// A scale and a start that are determined only as a product: the product equals the start for a scale of
 /// one.
 #[test]
-fn what_is_not_told_apart_has_its_product() {
+fn what_is_not_distinguished_has_its_product() {
     let mut normal = normals(8);
     let line = |k: i32| {
         let t = 0.2 * f64::from(k);

@@ -188,7 +188,7 @@ fn a_bench_counts_as_much_as_its_error_changes() {
 /// Where labels leave the beginning of the scheme open, it may explain residuals too. An error of five times
 /// its visible size is still named, although a later beginning would explain most of it.
 #[test]
-fn an_error_is_told_from_an_open_beginning() {
+fn an_error_is_distinguished_from_an_open_beginning() {
     use crate::simulator::AtOnce;
     let (mut named, mut open) = (0, 0);
     for seed in 0..12 {

@@ -238,7 +238,7 @@ fn twelve() -> Vec<(&'static str, [f64; 3], f64)> {
 /// Two positions determine D_FZ and psi_y only together: neither has an estimate, and their combination has
 /// that of the bench.
 #[test]
-fn what_is_not_told_apart_has_no_estimate() {
+fn what_is_not_distinguished_has_no_estimate() {
     let bench = Bench { seed: 4, drift: [[1.1, 1.2, 1.3], [0.5; 3], [0.5; 3], [0.5; 3]], ..Bench::default() };
     let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
     is_right(&c);
@@ -526,7 +526,7 @@ fn what_is_held_bends_little() {
         assert!(c.consistent, "{:?}", c.findings);
         assert!(errors(&bench, c).iter().all(|(_, e)| e.abs() < 3.5), "{:?}", errors(&bench, c));
     }
-    let moved = a.assumed.held.iter().filter(|h| OPEN.contains(&h.0.as_str()));
+    let moved = a.assumed.constrained.iter().filter(|h| OPEN.contains(&h.0.as_str()));
     let distance = moved.map(|(_, width, _)| (10.0 / width).powi(2)).sum::<f64>().sqrt();
     let mut compared = 0;
     for (u, v) in a.quantities.iter().chain(&a.combinations).zip(b.quantities.iter().chain(&b.combinations)) {

@@ -37,11 +37,11 @@ pub(super) fn carry_reports(
     let names = platform.names().to_vec();
     let verdicts = (0..names.len()).map(|c| findings.verdict(c)).collect();
     let own = NamedVerdicts { names, verdicts };
-    let (mut out, mut untold) = (Vec::new(), Vec::new());
+    let (mut out, mut notes) = (Vec::new(), Vec::new());
     for carry in Carry::ALL.into_iter().filter(|&c| c != scheme.carry) {
         let other = match Platform::new(Scheme { carry, ..scheme.clone() }) {
             Err(SchemeError::Path(e)) => {
-                untold.push(format!("nothing is said of {carry} carry: {e}"));
+                notes.push(format!("nothing is said of {carry} carry: {e}"));
                 continue;
             }
             other => other?,
@@ -70,13 +70,13 @@ pub(super) fn carry_reports(
         out.push(CarryReport { carry, unknowns: other.names().len(), differs, rank_profile });
     }
     if scheme.by_history() && scheme.positions.len() > 1 && !out.is_empty() {
-        untold.push(
+        notes.push(
             "where rotations are judged by their course, psi of reset carry is compared with the other \
              carries at the first position alone"
                 .into(),
         );
     }
-    Ok((out, untold))
+    Ok((out, notes))
 }
 
 /// Verdicts of a scheme that is not under reset carry, with verdicts on psi of every position, `psi_x@2`.

@@ -88,9 +88,9 @@ pub fn analyze(
     let formulas = options.formulas.then(|| formulas(&platform, &mut printer.solver));
     let formulas = formulas.and_then(|f| printer.noted(f));
     printer.notes.extend(term_notes(scheme));
-    let (carries, untold) = carries::carry_reports(&platform, verdicts, &findings.verdicts)?;
+    let (carries, carry_notes) = carries::carry_reports(&platform, verdicts, &findings.verdicts)?;
     let to_resolve = remedies::remedies(&platform, verdicts, &findings.verdicts, &carries);
-    printer.notes.extend(untold);
+    printer.notes.extend(carry_notes);
     let omitted = options.omitted.then(|| OmittedModel::new(&platform));
     let omitted = omitted.and_then(|model| omitted_verdicts(&platform, &model, options.seed).ok());
     printer.notes.extend(slew_note(scheme));

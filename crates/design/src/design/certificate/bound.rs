@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn no_bound_is_above_what_its_matrix_proves() {
         let mut rng = SplitMix64::new(43);
-        let mut told = 0;
+        let mut stated = 0;
         for task in 0..60 {
             let mut below = |n: u64| rng.below(n) as usize;
             let terms = ["F", "F,I", "F,O,S", "F,K0"][below(4)];
@@ -215,8 +215,8 @@ mod tests {
             assert!(truth.sub(&real(bound)).is_positive(), "task {task} {criterion:?}: {bound:e}");
             let part = truth.to_f64() / bound - 1.0;
             assert!(part < 1e-7, "task {task} {criterion:?}: {part:e}");
-            told += 1;
+            stated += 1;
         }
-        assert!(told > 40, "{told}");
+        assert!(stated > 40, "{stated}");
     }
 }

@@ -427,9 +427,9 @@ mod tests {
             let x = DMatrix::from_fn(m, 3, |_, _| below(1 << 20) as f64 / f64::from(1 << 19) - 1.0);
             let (n, g) = (evaluator.degree(), evaluator.information_of_effects());
             let energy = |e: &Euler| evaluator.energy_bounded(e, &g, &x);
-            let mut within = |kind: usize, told: f64, truth: &BallReal, radius: f64, place: &str| {
-                let off = real(told).sub(truth).to_f64().abs();
-                assert!(off <= radius, "{terms}: {place} {told:e} off by {off:e}, told {radius:e}");
+            let mut within = |kind: usize, stated: f64, truth: &BallReal, radius: f64, place: &str| {
+                let off = real(stated).sub(truth).to_f64().abs();
+                assert!(off <= radius, "{terms}: {place} {stated:e} off by {off:e}, stated {radius:e}");
                 largest[kind] = largest[kind].max(if radius > 0.0 { off / radius } else { 0.0 });
             };
             let net: Vec<_> =
@@ -449,8 +449,8 @@ mod tests {
             }
             for (c, e) in candidates.iter().enumerate() {
                 let rows = effects_of(&evaluator, e);
-                let told = energy(e);
-                within(1, told.value, &energy_of(&rows, &g, &x), told.radius, "energy");
+                let stated = energy(e);
+                within(1, stated.value, &energy_of(&rows, &g, &x), stated.radius, "energy");
                 let errors = evaluator.errors_of(std::iter::once((c, e)));
                 for (i, j) in (0..m).flat_map(|i| (0..=i).map(move |j| (i, j))) {
                     let unit = |k: usize| DMatrix::from_fn(m, 1, |i, _| f64::from(u8::from(i == k)));

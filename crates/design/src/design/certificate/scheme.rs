@@ -141,9 +141,9 @@ mod tests {
     /// rounding must be allowed for. Some schemes have coefficients that do not count, some are near
     /// singular.
     #[test]
-    fn no_criterion_is_above_what_is_told() {
+    fn no_criterion_is_above_its_stated_bound() {
         let mut rng = SplitMix64::new(41);
-        let (mut told, mut below, mut parts) = (0, 0, Vec::new());
+        let (mut bounded, mut below, mut parts) = (0, 0, Vec::new());
         for task in 0..300 {
             let mut drawn = |n: u64| rng.below(n) as usize;
             let (base, d) = drawn_scheme(&mut drawn);
@@ -191,11 +191,11 @@ mod tests {
                 );
                 below += usize::from(computed < truth);
             }
-            told += 1;
+            bounded += 1;
             parts.push(part);
         }
         parts.sort_by(f64::total_cmp);
         let median = parts[parts.len() / 2];
-        assert!(told > 120 && below > 30 && median < 1e-9, "{told} {below} {median:e}");
+        assert!(bounded > 120 && below > 30 && median < 1e-9, "{bounded} {below} {median:e}");
     }
 }

@@ -671,10 +671,10 @@ mod tests {
                 };
                 for (j, (a, b)) in at(&up).iter().zip(at(&down)).enumerate() {
                     let bend = (a - b) / (2.0 * h);
-                    let told = hessian[(k, j)];
+                    let computed = hessian[(k, j)];
                     assert!(
-                        (bend - told).abs() < 1e-4 * (1.0 + bend.abs()),
-                        "{objective:?} {k} {j}: {bend} {told}"
+                        (bend - computed).abs() < 1e-4 * (1.0 + bend.abs()),
+                        "{objective:?} {k} {j}: {bend} {computed}"
                     );
                 }
             }
