@@ -9,7 +9,7 @@ use obsdeg_evidence::simulation::omitted::{ChangePerUnit, Suspicion};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::setup::{Basis, Setup};
+use crate::setup::{Setup, SourceRecord};
 
 /// Name and version of the JSON layout.
 pub const LAYOUT: &str = "obsdeg.calibration/1";
@@ -30,7 +30,7 @@ pub struct Calibration {
     /// True if the model and its sigmas explain the records.
     pub consistent: bool,
     /// Evidence against the model or its sigmas, the gravest first; empty if there is none.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<CalibrationFinding>,
     /// Estimates of the unknowns, psi of the start of each record.
     pub quantities: Vec<Estimated>,
     /// Outcome of the requirements on coefficients by the sigmas of the estimates, rescaled where they are
@@ -76,7 +76,7 @@ pub struct Calibration {
     /// Scheme, geometry and carry that were calibrated.
     pub setup: Setup,
     /// Records that the estimates rest on, including those of the calibration before.
-    pub rests_on: Vec<Basis>,
+    pub rests_on: Vec<SourceRecord>,
     /// Residuals over time, by record and component.
     pub series: Vec<ResidualSeries>,
     /// Every measurement and what the estimate leaves of it.
@@ -100,7 +100,8 @@ impl Calibration {
 /// Evidence against the model or its sigmas.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", tag = "kind")]
-pub enum Finding {
+#[schemars(rename = "Finding")]
+pub enum CalibrationFinding {
     /// Interrupted iteration: the estimates are where it was then.
     Interrupted,
     /// Iteration that did not converge.
@@ -509,7 +510,7 @@ pub struct Before<S> {
     /// Estimates of the prior calibration, with the covariance that counts.
     pub estimates: CovarianceTable,
     /// Records that the prior calibration rests on, including those of its own prior.
-    pub rests_on: Vec<Basis>,
+    pub rests_on: Vec<SourceRecord>,
     /// Platform or model that the prior calibration is for.
     pub of: S,
 }

@@ -91,7 +91,7 @@ pub fn compared(now: &Calibration, before: &Calibration) -> CalibrationChange {
         Some(CoefficientChange { name: (*name).clone(), unit, before, change: now - before, sigma })
     });
     let coefficients: Vec<CoefficientChange> = changes.collect();
-    let shares = |b: &&crate::setup::Basis| before.rests_on.iter().any(|o| o.digest == b.digest);
+    let shares = |b: &&crate::setup::SourceRecord| before.rests_on.iter().any(|o| o.digest == b.digest);
     let shared: Vec<String> = now.rests_on.iter().filter(shares).map(|b| b.record.clone()).collect();
     let positions = |c: &Calibration| crate::setup::Setup { positions: Vec::new(), ..c.setup.clone() };
     let with_bench = names.iter().any(|name| outside(name) > 0.0);

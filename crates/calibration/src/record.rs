@@ -680,9 +680,9 @@ mod tests {
     use super::*;
 
     /// Line, numbers and label of a row.
-    type Read = (u64, Vec<Option<f64>>, String);
+    type ReadRow = (u64, Vec<Option<f64>>, String);
 
-    fn all(text: &str) -> Result<Vec<Read>, RecordError> {
+    fn all(text: &str) -> Result<Vec<ReadRow>, RecordError> {
         let record = Record::csv("r.csv", Box::new(std::io::Cursor::new(text.to_string())))?;
         let t = record.wanted(
             record.find("t").ok_or_else(|| record.missing("`t [s]`"))?,

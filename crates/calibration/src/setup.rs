@@ -68,14 +68,15 @@ impl Setup {
 
 /// Record that estimates rest on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct Basis {
+#[schemars(rename = "Basis")]
+pub struct SourceRecord {
     /// Name of the record, as it was given.
     pub record: String,
     /// Digest of the numbers of the record.
     pub digest: String,
 }
 
-impl Basis {
+impl SourceRecord {
     /// Element of `others` with the same numbers.
     pub(crate) fn among<'a>(&self, others: &'a [Self]) -> Option<&'a Self> {
         others.iter().find(|o| o.digest == self.digest)

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use clap::Args;
-use obsdeg_calibration::answer::{CovarianceTable, Finding};
+use obsdeg_calibration::answer::{CalibrationFinding, CovarianceTable};
 use obsdeg_calibration::platform::{RecordsRead, STANDARD_GRAVITY, read_records};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::system::SystemFinding;
@@ -231,7 +231,7 @@ impl Calibrated {
     /// True if the calibration was ended before it settled.
     pub fn interrupted(&self) -> bool {
         match self {
-            Self::Platform(c) => c.findings.contains(&Finding::Interrupted),
+            Self::Platform(c) => c.findings.contains(&CalibrationFinding::Interrupted),
             Self::Model(c) => c.findings.contains(&SystemFinding::Interrupted),
             Self::Read(_) => false,
         }

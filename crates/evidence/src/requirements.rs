@@ -85,7 +85,8 @@ pub struct Worst {
 /// meets its requirements; a run is an example, a record its confirmation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Basis {
+#[schemars(rename = "Basis")]
+pub enum SigmaSource {
     /// Information of all samples with the stated noise and random drift, psi at the end of the scheme (under
     /// reset carry at the end of each position); no prior knowledge.
     Predicted,
@@ -102,7 +103,7 @@ pub enum Basis {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Requirements {
     /// Source of the sigmas that decide.
-    pub basis: Basis,
+    pub basis: SigmaSource,
     /// Number of unknowns with a requirement.
     pub stated: usize,
     /// Number of unknowns that meet their requirement.
@@ -122,7 +123,7 @@ pub struct Requirements {
 
 impl Requirements {
     /// Decision on `claims`, in their order.
-    pub fn of<'a>(basis: Basis, claims: impl IntoIterator<Item = RequirementClaim<'a>>) -> Self {
+    pub fn of<'a>(basis: SigmaSource, claims: impl IntoIterator<Item = RequirementClaim<'a>>) -> Self {
         let mut out = Self {
             basis,
             stated: 0,
@@ -175,7 +176,7 @@ mod tests {
     #[test]
     fn what_is_met_and_what_is_missed() {
         let judged = Requirements::of(
-            Basis::Run,
+            SigmaSource::Run,
             [
                 claim("just", Some(0.1), Ok(0.1)),
                 claim("above", Some(0.1), Ok(0.1000001)),
@@ -198,9 +199,9 @@ mod tests {
         assert_eq!(missed, expected);
         assert!(judged.leaves_out());
         assert_eq!(judged.worst.map(|w| w.name).as_deref(), Some("above"));
-        assert!(!Requirements::of(Basis::Run, [claim("above", Some(0.1), Ok(0.2))]).leaves_out());
+        assert!(!Requirements::of(SigmaSource::Run, [claim("above", Some(0.1), Ok(0.2))]).leaves_out());
         // without a requirement none is met and none is missed
-        let none = Requirements::of(Basis::Predicted, [claim("free", None, Ok(1.0))]);
+        let none = Requirements::of(SigmaSource::Predicted, [claim("free", None, Ok(1.0))]);
         assert_eq!((none.stated, none.met, none.worst.is_none()), (0, 0, true));
         assert!(!none.all_met() && !none.any_missed());
     }

@@ -1,16 +1,16 @@
 //! The audit of the paper.
 
-use obsdeg_evidence::audit::{Audit, Finding};
+use obsdeg_evidence::audit::{Audit, AuditFinding};
 
 use crate::Answer;
 use crate::document::{Document, DocumentBlock, left};
 
-fn word(f: Finding) -> &'static str {
+fn word(f: AuditFinding) -> &'static str {
     match f {
-        Finding::Agree => "agree",
-        Finding::Conditional => "with a condition",
-        Finding::NotCovered => "not covered",
-        Finding::Disagree => "disagree",
+        AuditFinding::Agree => "agree",
+        AuditFinding::Conditional => "with a condition",
+        AuditFinding::NotCovered => "not covered",
+        AuditFinding::Disagree => "disagree",
     }
 }
 
@@ -20,7 +20,12 @@ impl Answer for Audit {
     }
 
     fn document(&self) -> Document {
-        let all = [Finding::Agree, Finding::Conditional, Finding::Disagree, Finding::NotCovered];
+        let all = [
+            AuditFinding::Agree,
+            AuditFinding::Conditional,
+            AuditFinding::Disagree,
+            AuditFinding::NotCovered,
+        ];
         let count = |f| self.lines.iter().filter(|l| l.finding == f).count();
         let counts = all.map(|f| format!("{} {}", count(f), word(f))).join(", ");
         let rows = self.lines.iter().map(|l| vec![l.place.as_str(), word(l.finding), &l.claim, &l.reason]);

@@ -1,7 +1,7 @@
 //! Sentences on findings of a calibration and on the clocks of its records.
 
 use obsdeg_calibration::answer::{
-    CellKind, Clock, ClockRate, Finding, ForceCause, ForceError, ForceLength, RecordReport,
+    CalibrationFinding, CellKind, Clock, ClockRate, ForceCause, ForceError, ForceLength, RecordReport,
 };
 
 use crate::document::number;
@@ -115,55 +115,61 @@ fn rates(c: &Clock) -> String {
     }
 }
 /// Sentence on a finding.
-pub(crate) fn finding(f: &Finding, records: &[RecordReport]) -> String {
+pub(crate) fn finding(f: &CalibrationFinding, records: &[RecordReport]) -> String {
     let of = |record: &str| of(record, records);
     match f {
-        Finding::Interrupted => "interrupted: the estimates are where the iteration was then".into(),
-        Finding::NotSettled => not_settled(),
-        Finding::Force { record, length_g, alike: true, causes, .. } => {
+        CalibrationFinding::Interrupted => {
+            "interrupted: the estimates are where the iteration was then".into()
+        }
+        CalibrationFinding::NotSettled => not_settled(),
+        CalibrationFinding::Force { record, length_g, alike: true, causes, .. } => {
             force_alike(&of(record), *length_g, causes)
         }
-        Finding::Force { record, least, most, causes, .. } => force_differs(&of(record), least, most, causes),
-        Finding::Cells { record, column, kind_of_cells, value, count, lines } => {
+        CalibrationFinding::Force { record, least, most, causes, .. } => {
+            force_differs(&of(record), least, most, causes)
+        }
+        CalibrationFinding::Cells { record, column, kind_of_cells, value, count, lines } => {
             cells(&place_of_cells(column, &of(record), *lines), *kind_of_cells, *value, *count)
         }
-        Finding::Succession { record, position, channel, count, lines, span_s, sigmas } => {
+        CalibrationFinding::Succession { record, position, channel, count, lines, span_s, sigmas } => {
             let place = place_of_succession(position, *span_s, *lines);
             succession(*count, &format!("{channel}{}", of(record)), &place, *sigmas)
         }
-        Finding::Clock { record, by_durations, by_durations_sigma, by_changes, by_earth } => {
+        CalibrationFinding::Clock { record, by_durations, by_durations_sigma, by_changes, by_earth } => {
             let by_durations = durations(*by_durations, *by_durations_sigma);
             clock_error(&of(record), by_durations.as_ref(), by_changes.as_ref(), by_earth.as_ref())
         }
-        Finding::ClockJump { record, line, place, from_s, by_s, chi_square, explains } => {
+        CalibrationFinding::ClockJump { record, line, place, from_s, by_s, chi_square, explains } => {
             let behind = format!("{from_s:.3} s ({place}, before line {line})");
             clock_jump(&of(record), *by_s, &behind, *chi_square, *explains)
         }
-        Finding::Copy { record, other, correlation } => format!(
+        CalibrationFinding::Copy { record, other, correlation } => format!(
             "{record} has the noise of {other} (correlation {correlation:.2} of their residuals): it is a \
              copy, and counts twice"
         ),
-        Finding::Turns { record, factor, slew_rate_deg_s } => turns(&of(record), *factor, *slew_rate_deg_s),
-        Finding::Position { record, position, chi_square, factor } => {
+        CalibrationFinding::Turns { record, factor, slew_rate_deg_s } => {
+            turns(&of(record), *factor, *slew_rate_deg_s)
+        }
+        CalibrationFinding::Position { record, position, chi_square, factor } => {
             unexplained_position(&of(record), position, *chi_square, *factor)
         }
-        Finding::Noise { chi_square, factor } => unexplained_scatter(*chi_square, *factor),
-        Finding::Channel { channel, chi_square, factor } => {
+        CalibrationFinding::Noise { chi_square, factor } => unexplained_scatter(*chi_square, *factor),
+        CalibrationFinding::Channel { channel, chi_square, factor } => {
             unexplained_channel(channel, *chi_square, *factor)
         }
-        Finding::Correlated { record, channel, probability } => {
+        CalibrationFinding::Correlated { record, channel, probability } => {
             correlated(&format!("{channel}{}", of(record)), *probability)
         }
-        Finding::Temperature { record, channel, correlation, probability } => {
+        CalibrationFinding::Temperature { record, channel, correlation, probability } => {
             with_temperature(&format!("{channel}{}", of(record)), *correlation, *probability)
         }
-        Finding::Outliers { count, of } => format!(
+        CalibrationFinding::Outliers { count, of } => format!(
             "{count} of {of} measurements are far off, too many to be outliers: none of them was left out"
         ),
-        Finding::Repeatability { chi_square } => records_disagree(*chi_square),
-        Finding::SecondPath { difference } => paths_differ(*difference),
-        Finding::Suspect { errors, chi_square_fall } => suspect(errors, *chi_square_fall),
-        Finding::Known { chi_square } => format!(
+        CalibrationFinding::Repeatability { chi_square } => records_disagree(*chi_square),
+        CalibrationFinding::SecondPath { difference } => paths_differ(*difference),
+        CalibrationFinding::Suspect { errors, chi_square_fall } => suspect(errors, *chi_square_fall),
+        CalibrationFinding::Known { chi_square } => format!(
             "the calibration before does not agree with these records (chi-square {} per degree of freedom)",
             number(*chi_square)
         ),

@@ -1,7 +1,7 @@
 //! Report of a calibration: decision and coefficients, fit, budget of the uncertainty, and changes since
 //! earlier calibrations.
 
-use obsdeg_calibration::{Basis, Calibration, CalibrationChange, compared};
+use obsdeg_calibration::{Calibration, CalibrationChange, SourceRecord, compared};
 
 use crate::calibration_figures::file_name;
 use crate::document::{Document, DocumentBlock, Grade, TableCell, estimate, left, number, optional, right};
@@ -64,7 +64,7 @@ fn made(c: &Calibration, origin: &Origin) -> String {
     if !origin.inputs.is_empty() || c.rests_on.is_empty() {
         return title::made(&c.version, origin);
     }
-    let of = |b: &Basis| {
+    let of = |b: &SourceRecord| {
         let digest: String = b.digest.chars().take(title::DIGITS).collect();
         format!("{} (digest of its numbers {digest}...)", file_name(&b.record))
     };

@@ -1,7 +1,7 @@
 //! Sentences on requirements, on conditions that are stated or not, and on the carry.
 
 use obsdeg_core::model::Carry;
-use obsdeg_evidence::requirements::{Basis, Miss, Requirements, Worst};
+use obsdeg_evidence::requirements::{Miss, Requirements, SigmaSource, Worst};
 use obsdeg_evidence::simulation::{
     ConditionsReport, Estimate, MeasurementReport, OtherCarry, RunDiffers, RunRequirements, SigmaRatio,
 };
@@ -72,9 +72,9 @@ fn outcome(r: &Requirements) -> String {
 pub(crate) fn requirements(r: &Requirements) -> String {
     let basis = match r.basis {
         _ if r.stated == 0 => return verdict(r),
-        Basis::Predicted | Basis::PredictedWithPrior => "",
-        Basis::Run => "in this run ",
-        Basis::Record => "by this record ",
+        SigmaSource::Predicted | SigmaSource::PredictedWithPrior => "",
+        SigmaSource::Run => "in this run ",
+        SigmaSource::Record => "by this record ",
     };
     format!("{basis}{}", outcome(r))
 }

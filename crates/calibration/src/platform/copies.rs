@@ -5,7 +5,7 @@
 //! of differences of neighbouring residuals are compared.
 
 use super::diagnose::{AnswerData, MeasurementResidual};
-use crate::answer::Finding;
+use crate::answer::CalibrationFinding;
 
 /// Fewest measurements of two records at the same times of the scheme.
 const FEWEST: usize = 20;
@@ -38,7 +38,7 @@ impl AnswerData<'_> {
     }
 
     /// Findings on pairs of records with the same noise.
-    pub(super) fn copies(&self) -> Vec<Finding> {
+    pub(super) fn copies(&self) -> Vec<CalibrationFinding> {
         let runs = self.problem.runs;
         if runs.len() < 2 {
             return Vec::new();
@@ -58,7 +58,7 @@ impl AnswerData<'_> {
                 let least = COPIED.max(SIGMAS / (steps.len() as f64).sqrt());
                 if steps.len() >= FEWEST && correlation > least {
                     let name = |r: usize| runs[r].reading.name.clone();
-                    out.push(Finding::Copy { record: name(a), other: name(b), correlation });
+                    out.push(CalibrationFinding::Copy { record: name(a), other: name(b), correlation });
                 }
             }
         }

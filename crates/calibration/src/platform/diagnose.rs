@@ -12,7 +12,7 @@ use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, CovarianceForm, EkfError};
 use obsdeg_evidence::acceptance::{MeasuredCoefficient, acceptance};
 use obsdeg_evidence::prediction::{PredictedCombination, Prediction};
-use obsdeg_evidence::requirements::{Basis, Miss, RequirementClaim, Requirements};
+use obsdeg_evidence::requirements::{Miss, RequirementClaim, Requirements, SigmaSource};
 use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, latitude_of, shown_unit, si_per_shown};
 
@@ -236,7 +236,7 @@ pub(crate) struct AnswerData<'a> {
     pub jump: Option<Jump>,
     pub too_many: Option<usize>,
     pub known: Vec<String>,
-    pub rests_on: Vec<setup::Basis>,
+    pub rests_on: Vec<setup::SourceRecord>,
     pub interrupted: bool,
 }
 
@@ -532,7 +532,7 @@ impl AnswerData<'_> {
             required: e.required_sigma,
             sigma: total(e, outside).ok_or(Miss::NotObservable),
         });
-        let mut out = Requirements::of(Basis::Record, claims);
+        let mut out = Requirements::of(SigmaSource::Record, claims);
         let stated = &self.conditions.bench;
         let estimated = |p: &Platform| Bench::estimated(stated, p).len();
         out.with_bench =

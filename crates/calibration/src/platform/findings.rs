@@ -10,7 +10,9 @@ use super::gross::GrossReason;
 use super::length::wrong;
 use super::run::RecordedRun;
 use super::successions::LeftOutMeasurement;
-use crate::answer::{Calibration, CellKind, ClockRate, Finding, ForceLength, PositionFit, RecordReport};
+use crate::answer::{
+    Calibration, CalibrationFinding, CellKind, ClockRate, ForceLength, PositionFit, RecordReport,
+};
 use crate::levels;
 
 /// Largest difference of the two paths, in sigma, that counts as agreement.
@@ -20,18 +22,22 @@ const APART: f64 = 2.0;
 
 impl AnswerData<'_> {
     /// Findings against a calibration, with the measurements that it left out.
-    pub(super) fn findings(&self, c: &Calibration, left_out: &[LeftOutMeasurement]) -> Vec<Finding> {
+    pub(super) fn findings(
+        &self,
+        c: &Calibration,
+        left_out: &[LeftOutMeasurement],
+    ) -> Vec<CalibrationFinding> {
         let jump = self.clock_jump();
         if let Some(jump) = jump.clone().filter(|_| self.jump.is_some_and(|j| j.explains)) {
             // everything else is by times that are wrong
-            let interrupted = self.interrupted.then_some(Finding::Interrupted);
+            let interrupted = self.interrupted.then_some(CalibrationFinding::Interrupted);
             return interrupted.into_iter().chain([jump]).collect();
         }
         let mut out = Vec::new();
         if self.interrupted {
-            out.push(Finding::Interrupted);
+            out.push(CalibrationFinding::Interrupted);
         } else if !self.estimate.converged {
-            out.push(Finding::NotSettled);
+            out.push(CalibrationFinding::NotSettled);
         }
         out.extend(jump);
         if !self.planned.platform.observed().accelerometers {
@@ -50,10 +56,10 @@ impl AnswerData<'_> {
                     self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < levels::CORRELATED)
                 {
                     let (record, channel) = (record.name.clone(), channel.channel.clone());
-                    out.push(Finding::Correlated { record, channel, probability });
+                    out.push(CalibrationFinding::Correlated { record, channel, probability });
                 }
                 if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < levels::TEMPERATURE) {
-                    out.push(Finding::Temperature {
+                    out.push(CalibrationFinding::Temperature {
                         record: record.name.clone(),
                         channel: channel.channel.clone(),
                         correlation: w.correlation,
@@ -62,30 +68,32 @@ impl AnswerData<'_> {
                 }
             }
         }
-        out.extend(self.too_many.map(|count| Finding::Outliers { count, of: self.found.all.len() }));
+        out.extend(
+            self.too_many.map(|count| CalibrationFinding::Outliers { count, of: self.found.all.len() }),
+        );
         if let Some(r) = c.repeatability.as_ref().filter(|r| r.chi_square > r.band.1) {
-            out.push(Finding::Repeatability { chi_square: r.chi_square });
+            out.push(CalibrationFinding::Repeatability { chi_square: r.chi_square });
         }
         if let Some(chi_square) = self.known_misfit() {
-            out.push(Finding::Known { chi_square });
+            out.push(CalibrationFinding::Known { chi_square });
         }
-        out.extend(c.omitted.suspicion.as_ref().map(|s| Finding::Suspect {
+        out.extend(c.omitted.suspicion.as_ref().map(|s| CalibrationFinding::Suspect {
             errors: s.errors.iter().map(|e| e.name.clone()).collect(),
             chi_square_fall: s.chi_square_fall,
         }));
         let difference = c.second_path.difference.max(c.second_path.sigma_difference);
         if difference.is_nan() || difference > AGREE {
-            out.push(Finding::SecondPath { difference });
+            out.push(CalibrationFinding::SecondPath { difference });
         }
         out
     }
 
     /// Finding on a clock that was set forward during the run.
-    fn clock_jump(&self) -> Option<Finding> {
+    fn clock_jump(&self) -> Option<CalibrationFinding> {
         let jump = self.jump?;
         let reading = &self.problem.runs[jump.run].reading;
         let gap = reading.gaps(self.scheme).swap_remove(jump.gap);
-        Some(Finding::ClockJump {
+        Some(CalibrationFinding::ClockJump {
             record: reading.name.clone(),
             line: gap.line,
             place: gap.place,
@@ -97,24 +105,24 @@ impl AnswerData<'_> {
     }
 
     /// Finding on the turns of a run. Where positions last longer by the same factor, the clock is wrong.
-    fn turns(&self, run: &RecordedRun) -> Option<Finding> {
+    fn turns(&self, run: &RecordedRun) -> Option<CalibrationFinding> {
         let factor = run.reading.of_turns(self.planned)?;
         if run.reading.by_durations(self.planned).is_some() {
             return None;
         }
         let rate = self.problem.conditions.slew_rate_deg_s.map(|rate| rate / factor);
-        Some(Finding::Turns { record: run.reading.name.clone(), factor, slew_rate_deg_s: rate })
+        Some(CalibrationFinding::Turns { record: run.reading.name.clone(), factor, slew_rate_deg_s: rate })
     }
 
     /// Finding on the length of the specific force of a run.
-    fn force(&self, run: &RecordedRun) -> Option<Finding> {
+    fn force(&self, run: &RecordedRun) -> Option<CalibrationFinding> {
         let reading = &run.reading;
         let wrong = wrong(&reading.lengths, levels::FORCE / self.problem.runs.len() as f64)?;
         let end = |p: usize| ForceLength {
             position: self.scheme.positions[p].name.clone(),
             length_g: reading.lengths[p].map_or(f64::NAN, |l| l.length),
         };
-        Some(Finding::Force {
+        Some(CalibrationFinding::Force {
             record: reading.name.clone(),
             length_g: reading.force.unwrap_or(f64::NAN),
             alike: wrong.alike,
@@ -125,7 +133,7 @@ impl AnswerData<'_> {
     }
 
     /// Findings on the fit: single positions, or the noise, or single components.
-    fn fits(&self, c: &Calibration) -> Vec<Finding> {
+    fn fits(&self, c: &Calibration) -> Vec<CalibrationFinding> {
         let all: Vec<&PositionFit> = c.positions.iter().filter(|p| p.degrees_of_freedom > 0.5).collect();
         let most = |dof: f64| chi_square_quantile(dof, 1.0 - levels::POSITION / all.len() as f64) / dof;
         let mut chi: Vec<f64> = all.iter().map(|p| p.chi_square).collect();
@@ -137,30 +145,31 @@ impl AnswerData<'_> {
             .filter(|p| p.chi_square > APART * usual.min(c.fit.band.1.max(1.0)))
             .collect();
         apart.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
-        let named = apart.iter().map(|p| Finding::Position {
+        let named = apart.iter().map(|p| CalibrationFinding::Position {
             record: p.record.clone(),
             position: p.position.clone(),
             chi_square: p.chi_square,
             factor: p.chi_square.sqrt(),
         });
-        let mut out: Vec<Finding> = if usual > APART && apart.iter().all(|p| p.chi_square < APART * usual) {
-            Vec::new()
-        } else {
-            named.collect()
-        };
+        let mut out: Vec<CalibrationFinding> =
+            if usual > APART && apart.iter().all(|p| p.chi_square < APART * usual) {
+                Vec::new()
+            } else {
+                named.collect()
+            };
         if !out.is_empty() {
             return out;
         }
         let total = c.fit.factor * c.fit.factor;
         if !(c.fit.band.0..=c.fit.band.1).contains(&total) {
-            out.push(Finding::Noise { chi_square: total, factor: c.fit.factor });
+            out.push(CalibrationFinding::Noise { chi_square: total, factor: c.fit.factor });
             return out;
         }
         for channel in &c.channels {
             let (dof, level) = (channel.degrees_of_freedom, levels::CHANNEL / c.channels.len() as f64);
             let band = chi_square_band(dof.max(1e-3), 1.0, 1.0 - level).map_both(|x| x / dof.max(1e-3));
             if !(band.0..=band.1).contains(&channel.chi_square) {
-                out.push(Finding::Channel {
+                out.push(CalibrationFinding::Channel {
                     channel: channel.channel.clone(),
                     chi_square: channel.chi_square,
                     factor: channel.chi_square.sqrt(),
@@ -181,8 +190,8 @@ impl AnswerData<'_> {
 }
 
 /// Findings on repeated values of cells in a column.
-fn cells(run: &RecordedRun) -> Vec<Finding> {
-    let mut out: Vec<Finding> = Vec::new();
+fn cells(run: &RecordedRun) -> Vec<CalibrationFinding> {
+    let mut out: Vec<CalibrationFinding> = Vec::new();
     for (cell, own) in &run.reading.cells {
         let kind = match cell.why {
             GrossReason::Far => continue,
@@ -190,7 +199,7 @@ fn cells(run: &RecordedRun) -> Vec<Finding> {
             GrossReason::Stuck => CellKind::Stuck,
         };
         let same = out.iter_mut().find_map(|f| match f {
-            Finding::Cells { column, kind_of_cells, value, count, lines, .. }
+            CalibrationFinding::Cells { column, kind_of_cells, value, count, lines, .. }
                 if column == own && *kind_of_cells == kind && *value == cell.value =>
             {
                 Some((count, lines))
@@ -202,7 +211,7 @@ fn cells(run: &RecordedRun) -> Vec<Finding> {
                 *count += 1;
                 *lines = (lines.0.min(cell.lines.0), lines.1.max(cell.lines.1));
             }
-            None => out.push(Finding::Cells {
+            None => out.push(CalibrationFinding::Cells {
                 record: run.reading.name.clone(),
                 column: own.clone(),
                 kind_of_cells: kind,
@@ -219,7 +228,7 @@ fn cells(run: &RecordedRun) -> Vec<Finding> {
 /// sigmas as the fit has them; or by the durations of positions, where a clock would change a drift by more
 /// than its sigma. If the rate of the earth shows a right clock, positions were only held longer or shorter
 /// than in the scheme, and there is no finding.
-fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
+fn clock(record: &RecordReport, c: &Calibration) -> Option<CalibrationFinding> {
     // two tests
     let level = levels::CLOCK / (2 * c.records.len()) as f64;
     let most = chi_square_quantile(1.0, 1.0 - level).sqrt() * c.fit.factor.max(1.0);
@@ -233,7 +242,7 @@ fn clock(record: &RecordReport, c: &Calibration) -> Option<Finding> {
     let rates = c.quantities.iter().filter(|q| q.unit.starts_with("deg/h"));
     let sigmas = rates.filter_map(|q| Some((q.estimate? / q.sigma?).abs())).fold(0.0, f64::max);
     let matters = clock.by_durations.is_some_and(|fast| fast.abs() * sigmas > 1.0);
-    (changes.is_some() || earth.is_some() || matters && !held).then(|| Finding::Clock {
+    (changes.is_some() || earth.is_some() || matters && !held).then(|| CalibrationFinding::Clock {
         record: record.name.clone(),
         by_durations: clock.by_durations,
         by_durations_sigma: clock.by_durations_sigma,

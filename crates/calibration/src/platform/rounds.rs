@@ -20,7 +20,7 @@ use super::{CalibrationError, Options, known};
 use crate::CalibrationProgress;
 use crate::answer::Calibration;
 use crate::record::Record;
-use crate::setup::Basis;
+use crate::setup::SourceRecord;
 
 /// Most rounds of leaving out outliers, or of estimating the noise.
 const ROUNDS: usize = 6;
@@ -68,14 +68,14 @@ impl CalibrationInputs<'_> {
         &self,
         records: Vec<Record>,
         sigmas: &[f64],
-    ) -> Result<(Vec<RecordedRun>, Vec<Basis>), CalibrationError> {
+    ) -> Result<(Vec<RecordedRun>, Vec<SourceRecord>), CalibrationError> {
         let mut runs = Vec::with_capacity(records.len());
         let before = self.options.prior.as_ref();
-        let mut rests_on: Vec<Basis> = Vec::new();
+        let mut rests_on: Vec<SourceRecord> = Vec::new();
         for record in records {
             let (gravity, step) = (self.options.gravity_m_s2, self.conditions.step_s);
             let reading = observe(record, self.planned, gravity, step, sigmas.to_vec(), self.progress)?;
-            let basis = Basis { record: reading.name.clone(), digest: reading.digest.clone() };
+            let basis = SourceRecord { record: reading.name.clone(), digest: reading.digest.clone() };
             let same = |other: String| CalibrationError::SameRecord { record: basis.record.clone(), other };
             if let Some(other) = basis.among(&rests_on) {
                 return Err(same(other.record.clone()));
@@ -307,7 +307,7 @@ impl<'a> Rounds<'a> {
         &self,
         problem: &PlatformProblem<'_>,
         last: LastRound,
-        rests_on: Vec<Basis>,
+        rests_on: Vec<SourceRecord>,
     ) -> Result<Calibration, CalibrationError> {
         let LastRound { mut estimate, found, too_many } = last;
         let inputs = self.inputs;

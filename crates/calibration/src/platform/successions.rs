@@ -6,7 +6,7 @@ use super::diagnose::AnswerData;
 use super::gross::GrossReason;
 use super::placed::channel_name;
 use super::run::RecordedRun;
-use crate::answer::{Finding, Outlier};
+use crate::answer::{CalibrationFinding, Outlier};
 
 /// Least number of measurements of a succession.
 const FEWEST: usize = 4;
@@ -68,7 +68,7 @@ impl AnswerData<'_> {
     }
 
     /// Findings on successions among the measurements that were left out.
-    pub(super) fn successions(&self, left_out: &[LeftOutMeasurement]) -> Vec<Finding> {
+    pub(super) fn successions(&self, left_out: &[LeftOutMeasurement]) -> Vec<CalibrationFinding> {
         let mut all: Vec<&LeftOutMeasurement> = left_out.iter().collect();
         let group =
             |l: &LeftOutMeasurement| (l.outlier.record.clone(), l.outlier.channel.clone(), l.position);
@@ -85,7 +85,7 @@ impl AnswerData<'_> {
                 let sigmas = || run.iter().map(|l| l.outlier.sigmas.abs());
                 let end = |l: &LeftOutMeasurement| l.outlier.t_s;
                 let sign = run[0].outlier.sigmas.signum();
-                Finding::Succession {
+                CalibrationFinding::Succession {
                     record: run[0].outlier.record.clone(),
                     position: self.scheme.positions[run[0].position].name.clone(),
                     channel: run[0].outlier.channel.clone(),

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::answer::CovarianceTable;
 use crate::record::{MOST, RecordError};
-use crate::setup::Basis;
+use crate::setup::SourceRecord;
 
 /// Calibration of a system from one record.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -71,7 +71,7 @@ pub struct SystemCalibration {
     /// Digest of the model, to recognise it.
     pub model: String,
     /// Records that the estimates rest on, including those of the calibration before.
-    pub rests_on: Vec<Basis>,
+    pub rests_on: Vec<SourceRecord>,
     /// True if the calibration before rests on the same record, by another model.
     pub shared: bool,
     /// Largest number of integration steps between two rows.

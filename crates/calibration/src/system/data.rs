@@ -33,7 +33,7 @@ pub(super) struct Data {
 }
 
 /// Data of a model.
-pub(super) struct Read {
+pub(super) struct ModelData {
     pub(super) rows: Vec<Data>,
     /// Known inputs with values in every row.
     pub(super) inputs: Vec<usize>,
@@ -316,7 +316,7 @@ pub(super) fn read(
     model: &SystemModel,
     uses_time: bool,
     progress: &dyn Fn(CalibrationProgress<'_>) -> bool,
-) -> Result<Read, SystemCalibrationError> {
+) -> Result<ModelData, SystemCalibrationError> {
     let record = record.named(&model.recording)?;
     let columns = ModelColumns::of(&record, model)?;
     let still = model.recording.still.as_ref();
@@ -359,7 +359,7 @@ pub(super) fn read(
         rule = states_start(&rows, model, uses_time);
         origins = from_origins(&mut rows, rule, begins, experiments);
     }
-    Ok(Read {
+    Ok(ModelData {
         rows,
         inputs: columns.inputs.iter().map(|(k, _)| *k).collect(),
         name,

@@ -6,7 +6,7 @@ use obsdeg_ekf::integrate::runge_kutta;
 use obsdeg_ekf::{EkfError, Measurement};
 use obsdeg_evidence::system::Numeric;
 
-use super::data::{Data, Read};
+use super::data::{Data, ModelData};
 use crate::CalibrationProgress;
 use crate::least_squares::{LeastSquaresSolution, StackedRows};
 
@@ -24,7 +24,7 @@ pub(super) const WEAK: f64 = 1e7;
 /// Model with its data.
 pub(super) struct SystemProblem<'a> {
     pub(super) numeric: Numeric<'a>,
-    pub(super) data: &'a Read,
+    pub(super) data: &'a ModelData,
     /// Filter states that are estimated.
     pub(super) free: Vec<usize>,
     /// Noise by output: from the model's file, or as estimated; a sigma of the record takes precedence.

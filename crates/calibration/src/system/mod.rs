@@ -32,9 +32,9 @@ use crate::answer::{Before, CovarianceTable};
 use crate::least_squares::LeastSquaresSolution;
 use crate::levels;
 use crate::record::Record;
-use crate::setup::Basis;
+use crate::setup::SourceRecord;
 use before::said_before;
-use data::{Read, before_first_row, read};
+use data::{ModelData, before_first_row, read};
 use fit::{LONG, ModelRows, Settled, Stuck, SystemProblem, WEAK, leverage, rank, settle, size, step};
 
 /// Name and version of the JSON layout.
@@ -74,7 +74,7 @@ pub fn calibrate_system(
 ) -> Result<SystemCalibration, SystemCalibrationError> {
     let compiled = model.compile()?;
     let data = read(record, model, compiled.uses_time(), progress)?;
-    let basis = Basis { record: data.name.clone(), digest: data.digest.clone() };
+    let basis = SourceRecord { record: data.name.clone(), digest: data.digest.clone() };
     let own = digest(model);
     let again = options.prior.as_ref().and_then(|b| Some((b, basis.among(&b.rests_on)?)));
     if let Some((_, other)) = again.filter(|(b, _)| b.of == own) {
@@ -174,7 +174,7 @@ impl FinalFit {
 struct Calibrating<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
-    data: &'a Read,
+    data: &'a ModelData,
     options: &'a SystemCalibrationOptions,
     problem: SystemProblem<'a>,
     /// All filter states at the first start.
@@ -188,7 +188,7 @@ impl<'a> Calibrating<'a> {
         model: &'a SystemModel,
         compiled: &'a Compiled,
         numeric: Numeric<'a>,
-        data: &'a Read,
+        data: &'a ModelData,
         options: &'a SystemCalibrationOptions,
         progress: &'a dyn Fn(CalibrationProgress<'_>) -> bool,
     ) -> Result<Self, SystemCalibrationError> {
@@ -524,8 +524,8 @@ impl<'a> Calibrating<'a> {
     }
 
     /// Records that the estimates rest on.
-    fn rests_on(&self) -> Vec<Basis> {
-        let own = Basis { record: self.data.name.clone(), digest: self.data.digest.clone() };
+    fn rests_on(&self) -> Vec<SourceRecord> {
+        let own = SourceRecord { record: self.data.name.clone(), digest: self.data.digest.clone() };
         let before = self.options.prior.iter().flat_map(|b| b.rests_on.iter());
         let before = before.filter(|b| own.among(std::slice::from_ref(b)).is_none());
         std::iter::once(own.clone()).chain(before.cloned()).collect()
@@ -533,7 +533,7 @@ impl<'a> Calibrating<'a> {
 
     /// True if the prior calibration rests on the same record.
     fn shared(&self) -> bool {
-        let own = Basis { record: self.data.name.clone(), digest: self.data.digest.clone() };
+        let own = SourceRecord { record: self.data.name.clone(), digest: self.data.digest.clone() };
         self.options.prior.as_ref().is_some_and(|b| own.among(&b.rests_on).is_some())
     }
 
@@ -622,7 +622,7 @@ fn first_start(model: &SystemModel, numeric: &Numeric<'_>) -> Result<DVector<f64
 }
 
 /// Noise by output at the first start, and true for each output whose noise is estimated.
-fn first_noise(model: &SystemModel, data: &Read) -> (Vec<f64>, Vec<bool>) {
+fn first_noise(model: &SystemModel, data: &ModelData) -> (Vec<f64>, Vec<bool>) {
     // a row without a sigma of its own needs one
     let bare = |j: usize| data.rows.iter().any(|r| r.outputs[j].is_some() && r.sigmas[j].is_none());
     let by_inputs = data.rows.iter().any(|r| r.inputs.iter().any(|(_, s)| *s > 0.0));
@@ -641,7 +641,7 @@ fn first_noise(model: &SystemModel, data: &Read) -> (Vec<f64>, Vec<bool>) {
 ///
 /// # Errors
 /// [`SystemCalibrationError::TooLong`], before the work begins.
-fn integration_steps(model: &SystemModel, data: &Read) -> Result<(f64, f64), SystemCalibrationError> {
+fn integration_steps(model: &SystemModel, data: &ModelData) -> Result<(f64, f64), SystemCalibrationError> {
     let last = data.rows.iter().map(|r| r.t).fold(0.0, f64::max);
     let usual = if last > 0.0 { last / 50.0 } else { 1.0 };
     let longest = model.simulation.step.unwrap_or(f64::INFINITY).min(usual);

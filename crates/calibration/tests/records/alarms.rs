@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use obsdeg_calibration::answer::Finding;
+use obsdeg_calibration::answer::CalibrationFinding;
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, Options, calibrate, levels};
 use obsdeg_core::model::settings::Assignment;
@@ -130,7 +130,7 @@ fn calibrated(kind: Kind, seed: u64) -> Calibration {
 }
 
 /// Name of a finding without its figures.
-fn name(finding: &Finding) -> String {
+fn name(finding: &CalibrationFinding) -> String {
     format!("{finding:?}").chars().take_while(|c| c.is_alphanumeric()).collect()
 }
 

@@ -2,7 +2,7 @@
 //! accurate as its sigmas, or an answer that says why it is not.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_calibration::answer::Finding;
+use obsdeg_calibration::answer::CalibrationFinding;
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, Options, calibrate};
 use obsdeg_core::model::Carry;
@@ -233,7 +233,7 @@ fn run(case: &Case, seeds: std::ops::Range<u64>) -> Outcome {
         let (of, conditions) = case.stated(&bench);
         let (value, n) = nees(&bench, &c, &combinations(&of, &conditions, &bench));
         out.estimates = out.estimates.max(n);
-        out.unsettled += usize::from(c.findings.iter().any(|f| matches!(f, Finding::NotSettled)));
+        out.unsettled += usize::from(c.findings.iter().any(|f| matches!(f, CalibrationFinding::NotSettled)));
         let open = c.quantities.iter().chain(&c.combinations).filter(|e| e.left_open).count();
         out.open += usize::from(open > 0);
         out.boxed |= !c.assumed.constrained.is_empty();

@@ -1,6 +1,6 @@
 //! Invalid cells: each is named by row and column, and the estimate is that of the other cells.
 
-use obsdeg_calibration::answer::{CellKind, Finding};
+use obsdeg_calibration::answer::{CalibrationFinding, CellKind};
 use obsdeg_calibration::{Calibration, CalibrationError};
 
 use crate::round_trip::{errors, of_csv, six, with_recording};
@@ -56,7 +56,7 @@ fn gross_cells(cases: &[(f64, std::ops::Range<usize>, usize)]) {
                 let outlier = c.outliers.iter().any(|o| o.lines == (line, line) && o.channel == column);
                 let code = c.findings.iter().any(|f| {
                     matches!(f,
-                    Finding::Cells { column: found, lines, .. } if *lines == (line, line) && found == column)
+                    CalibrationFinding::Cells { column: found, lines, .. } if *lines == (line, line) && found == column)
                 });
                 assert!(outlier || code, "{step_s} s, {column}, {what}: {:?} {:?}", c.outliers, c.findings);
                 // some samples are far from the line of a dense bin by chance
@@ -98,8 +98,11 @@ fn codes_are_asked_about() {
         (from..from + 12).for_each(|k| own[k].f[1] = code);
         let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
         is_near(&bench, &c, "a code");
-        let [Finding::Cells { column, kind_of_cells: CellKind::Code, value, count: 12, lines, .. }] =
-            &c.findings[..]
+        let [
+            CalibrationFinding::Cells {
+                column, kind_of_cells: CellKind::Code, value, count: 12, lines, ..
+            },
+        ] = &c.findings[..]
         else {
             panic!("{:?}", c.findings)
         };
@@ -123,7 +126,9 @@ fn codes_are_asked_about() {
     let c: Result<_, CalibrationError> = of_csv(&bench, "F,I,O,S", csv(&own));
     let c = c.expect("calibrated");
     is_near(&bench, &c, "stuck");
-    let stuck = |f: &&Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Stuck, .. });
+    let stuck = |f: &&CalibrationFinding| {
+        matches!(f, CalibrationFinding::Cells { kind_of_cells: CellKind::Stuck, .. })
+    };
     assert_eq!(c.findings.iter().filter(stuck).count(), 3, "{:?}", c.findings);
 }
 
@@ -136,7 +141,9 @@ fn a_code_here_and_there_is_asked_about() {
         own[k].f[1] = -9999.0;
     }
     let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
-    let code = |f: &Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Code, count: 3, .. });
+    let code = |f: &CalibrationFinding| {
+        matches!(f, CalibrationFinding::Cells { kind_of_cells: CellKind::Code, count: 3, .. })
+    };
     assert!(c.findings.iter().any(code) && c.outliers.is_empty(), "{:?} {:?}", c.findings, c.outliers);
     is_near(&bench, &c, "codes");
 }
@@ -150,7 +157,9 @@ fn codes_are_no_other_unit() {
         let mut own = bench.record();
         own.iter_mut().skip(3).step_by(50).for_each(|s| s.f = [code; 3]);
         let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
-        let is_code = |f: &&Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Code, .. });
+        let is_code = |f: &&CalibrationFinding| {
+            matches!(f, CalibrationFinding::Cells { kind_of_cells: CellKind::Code, .. })
+        };
         assert_eq!(c.findings.iter().filter(is_code).count(), 3, "{code}: {:?}", c.findings);
         is_near(&bench, &c, "codes");
     }
@@ -173,7 +182,9 @@ fn a_stuck_output_is_no_code() {
         own[from..from + 15].iter_mut().for_each(|s| s.f[axis] = value);
     }
     let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
-    let stuck = |f: &Finding| matches!(f, Finding::Cells { kind_of_cells: CellKind::Stuck, count: 14, .. });
+    let stuck = |f: &CalibrationFinding| {
+        matches!(f, CalibrationFinding::Cells { kind_of_cells: CellKind::Stuck, count: 14, .. })
+    };
     assert!(c.findings.len() == 3 && c.findings.iter().all(stuck), "{:?}", c.findings);
     is_near(&bench, &c, "stuck");
 }
@@ -188,7 +199,8 @@ fn frequent_codes_are_asked_about() {
         rows.iter().for_each(|&k| own[k].f[0] = code);
         let at_rest = rows.iter().filter(|&&k| !own[k].label.is_empty()).count();
         let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
-        let [Finding::Cells { column, kind_of_cells: CellKind::Code, value, count, .. }] = &c.findings[..]
+        let [CalibrationFinding::Cells { column, kind_of_cells: CellKind::Code, value, count, .. }] =
+            &c.findings[..]
         else {
             panic!("{every} {code}: {:?}", c.findings)
         };

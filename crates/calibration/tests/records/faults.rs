@@ -2,7 +2,7 @@
 //! itself, compared with other computations.
 
 use nalgebra::DMatrix;
-use obsdeg_calibration::answer::{Finding, ForceError};
+use obsdeg_calibration::answer::{CalibrationFinding, ForceError};
 use obsdeg_calibration::platform::{Mistaken, read_records};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Before, Calibration, CalibrationError, Options, Setup, calibrate};
@@ -84,7 +84,7 @@ fn an_axis_is_named() {
         let bench = Bench { accelerometers: [k0, k1, [0.0; 3]], scale, drift, ..bench() };
         let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
         let forces: Vec<f64> = c.positions.iter().filter_map(|p| p.force_g).collect();
-        let force = |f: &Finding| matches!(f, Finding::Force { .. });
+        let force = |f: &CalibrationFinding| matches!(f, CalibrationFinding::Force { .. });
         (c.findings.into_iter().find(force), forces)
     };
     let none = [0.0; 3];
@@ -96,7 +96,9 @@ fn an_axis_is_named() {
             for (k0, k1, error, within) in
                 [(none, one, ForceError::Scale, 2e-5), (one, none, ForceError::Zero, 2e-5)]
             {
-                let Some(Finding::Force { alike, causes, .. }) = found(k0, k1, 1.0).0 else { panic!("{by}") };
+                let Some(CalibrationFinding::Force { alike, causes, .. }) = found(k0, k1, 1.0).0 else {
+                    panic!("{by}")
+                };
                 let [cause] = &causes[..] else { panic!("{name} {by}: {causes:?}") };
                 assert_eq!((alike, cause.axis.as_str(), cause.error), (false, name, error));
                 assert!((cause.by - by).abs() < within && cause.besides.is_none(), "{cause:?}");
@@ -104,10 +106,10 @@ fn an_axis_is_named() {
         }
     }
     let (all, _) = found(none, none, 1.001);
-    let Some(Finding::Force { alike, length_g, causes, .. }) = all else { panic!("{all:?}") };
+    let Some(CalibrationFinding::Force { alike, length_g, causes, .. }) = all else { panic!("{all:?}") };
     assert!(alike && causes.is_empty() && (length_g - 1.001).abs() < 1e-5, "{length_g}");
     let (two, forces) = found(none, [5e-4, -4e-4, 0.0], 1.0);
-    let Some(Finding::Force { alike, causes, least, most, .. }) = two else { panic!("{two:?}") };
+    let Some(CalibrationFinding::Force { alike, causes, least, most, .. }) = two else { panic!("{two:?}") };
     assert!(!alike && causes.is_empty() && least.length_g < most.length_g, "{causes:?}");
     // lengths by hand, from the attitudes: 1 + s_x f_x^2 + s_y f_y^2
     for ((_, angles, _), length) in bench().positions.iter().zip(forces) {
@@ -127,7 +129,7 @@ fn by_clock(bench: &Bench, fast: f64) -> Vec<Sample> {
 /// Finding on the clock: fractions by durations and by the earth.
 fn clock_of(c: &Calibration) -> Option<(Option<f64>, Option<f64>)> {
     c.findings.iter().find_map(|f| match f {
-        Finding::Clock { by_durations, by_earth, .. } => {
+        CalibrationFinding::Clock { by_durations, by_earth, .. } => {
             Some((*by_durations, by_earth.as_ref().map(|e| e.fast)))
         }
         _ => None,
@@ -145,7 +147,8 @@ fn a_clock_shows_by_the_changes_of_position() {
         let found = c.records[0].clock.by_changes.as_ref().expect("seen");
         println!("{fast}: {found:?}, {:?}", clock_of(&c));
         assert!((found.fast - fast).abs() < 4.0 * found.sigma && found.sigma < 5e-5, "{fast}: {found:?}");
-        let by_changes = |f: &Finding| matches!(f, Finding::Clock { by_changes: Some(_), .. });
+        let by_changes =
+            |f: &CalibrationFinding| matches!(f, CalibrationFinding::Clock { by_changes: Some(_), .. });
         assert_eq!(c.findings.iter().any(by_changes), fast != 0.0, "{fast}: {:?}", c.findings);
         // the rates of the earth and of turns are by the same clock
         let earth = c.records[0].clock.by_earth.as_ref().expect("seen");
@@ -172,9 +175,14 @@ fn a_scale_is_no_clock() {
         accelerometers[1][axis] = scale;
         let bench = Bench { drift, dropped: 0, accelerometers, ..bench() };
         let c = of_csv(&bench, "F,I,O,S", csv(&bench.record())).expect("calibrated");
-        let clock = |f: &Finding| matches!(f, Finding::Clock { by_changes: Some(_), .. });
+        let clock =
+            |f: &CalibrationFinding| matches!(f, CalibrationFinding::Clock { by_changes: Some(_), .. });
         assert!(!c.consistent && !c.findings.iter().any(clock), "{axis}: {:?}", c.findings);
-        assert!(c.findings.iter().any(|f| matches!(f, Finding::Force { .. })), "{axis}: {:?}", c.findings);
+        assert!(
+            c.findings.iter().any(|f| matches!(f, CalibrationFinding::Force { .. })),
+            "{axis}: {:?}",
+            c.findings
+        );
     }
 }
 
@@ -191,7 +199,7 @@ fn a_clock_that_is_set_forward_is_named() {
         let set = |(k, s): (usize, &Sample)| Sample { t: s.t + if k < at { 0.0 } else { by }, ..s.clone() };
         let own: Vec<Sample> = samples.iter().enumerate().map(set).collect();
         let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
-        let [Finding::ClockJump { line, place: found, by_s, chi_square, explains: true, .. }] =
+        let [CalibrationFinding::ClockJump { line, place: found, by_s, chi_square, explains: true, .. }] =
             &c.findings[..]
         else {
             panic!("{by} at {at}: {:?}", c.findings)
@@ -207,8 +215,8 @@ fn a_clock_that_is_set_forward_is_named() {
     };
     let both: Vec<Sample> = samples.iter().enumerate().map(set).collect();
     let c = of_csv(&bench, "F,I,O,S", csv(&both)).expect("calibrated");
-    let jump = |f: &Finding| matches!(f, Finding::ClockJump { explains: false, .. });
-    let force = |f: &Finding| matches!(f, Finding::Force { .. });
+    let jump = |f: &CalibrationFinding| matches!(f, CalibrationFinding::ClockJump { explains: false, .. });
+    let force = |f: &CalibrationFinding| matches!(f, CalibrationFinding::Force { .. });
     assert!(c.findings.iter().any(jump) && c.findings.iter().any(force), "{:?}", c.findings);
     let lost: Vec<Sample> = samples
         .iter()
@@ -268,7 +276,9 @@ fn a_step_is_no_row_of_outliers() {
         stepped[from..to].iter_mut().for_each(|s| s.f[1] += 1e-4);
         let c = of_csv(&bench, "F,I,O,S", csv(&stepped)).expect("calibrated");
         let named = c.findings.iter().find_map(|f| match f {
-            Finding::Succession { position, count, sigmas, .. } => Some((position.clone(), *count, *sigmas)),
+            CalibrationFinding::Succession { position, count, sigmas, .. } => {
+                Some((position.clone(), *count, *sigmas))
+            }
             _ => None,
         });
         let (position, count, sigmas) = named.unwrap_or_else(|| panic!("{:?} {:?}", c.findings, c.outliers));
@@ -628,7 +638,7 @@ fn copies_are_found_by_their_noise() {
     let samples = bench.record();
     let of = |c: &Calibration| {
         c.findings.iter().find_map(|f| match f {
-            Finding::Copy { record, other, correlation } => {
+            CalibrationFinding::Copy { record, other, correlation } => {
                 Some((record.clone(), other.clone(), *correlation))
             }
             _ => None,

@@ -1,7 +1,7 @@
 //! Records with an error in their truth that the scheme does not estimate: the error is named. Answers
 //! without such an error.
 
-use obsdeg_calibration::answer::Finding;
+use obsdeg_calibration::answer::CalibrationFinding;
 use obsdeg_calibration::{Calibration, Options, calibrate, record::Record};
 
 use obsdeg_core::model::settings::Assignment;
@@ -98,7 +98,7 @@ fn an_accelerometer_zero_is_named() {
         assert!((found.errors[0].estimate - 15.0).abs() < 4.0 * found.errors[0].sigma, "{found:?}");
         assert!((with.with + 0.028).abs() < 4.0 * sigma, "{with:?}");
     }
-    assert!(c.findings.iter().any(|f| matches!(f, Finding::Suspect { .. })), "{:?}", c.findings);
+    assert!(c.findings.iter().any(|f| matches!(f, CalibrationFinding::Suspect { .. })), "{:?}", c.findings);
     assert!(!c.consistent);
 }
 

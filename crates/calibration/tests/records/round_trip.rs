@@ -1,7 +1,7 @@
 //! From a bench to a record to an estimate: the estimate equals the truth of the bench within its sigmas.
 
 use nalgebra::{DMatrix, DVector};
-use obsdeg_calibration::answer::{Finding, PositionsBy};
+use obsdeg_calibration::answer::{CalibrationFinding, PositionsBy};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, CalibrationError, CalibrationProgress, Options, calibrate};
 use obsdeg_core::model::settings::{Assignment, DriftNoise};
@@ -325,7 +325,9 @@ fn faults_are_named() {
     // scale error
     let c = of_csv(&bench, "F,I,O,S", csv(&Bench { scale: 1.001, ..bench.clone() }.record()))
         .expect("calibrated");
-    let Some(Finding::Force { length_g, .. }) = c.findings.first() else { panic!("{:?}", c.findings) };
+    let Some(CalibrationFinding::Force { length_g, .. }) = c.findings.first() else {
+        panic!("{:?}", c.findings)
+    };
     assert!((length_g - 1.001).abs() < 1e-4, "{length_g}");
 
     // noise three times as large as stated, everywhere
@@ -335,7 +337,7 @@ fn faults_are_named() {
         csv(&Bench { noise_g: 3e-5, ..bench.clone() }.record()),
     );
     let c = c.expect("calibrated");
-    let [Finding::Noise { factor, .. }] = c.findings[..] else { panic!("{:?}", c.findings) };
+    let [CalibrationFinding::Noise { factor, .. }] = c.findings[..] else { panic!("{:?}", c.findings) };
     assert!((factor / 3.0 - 1.0).abs() < 0.1, "{factor}");
     let u = &c.quantities[3];
     assert!((u.sigma_rescaled.expect("there") / u.sigma.expect("there") - factor).abs() < 1e-9);
@@ -473,7 +475,7 @@ fn columns_of_all_kinds() {
     let e = with_recording(&bench, recording.clone(), text(0.0, 7.0)).expect_err("turned").to_string();
     assert!(e.contains("at p1 the gimbals are 7.0 deg from where the scheme has them"), "{e}");
     let c = with_recording(&bench, recording, text(1.5e-5, 0.0)).expect("calibrated");
-    let warm = |f: &Finding| matches!(f, Finding::Temperature { correlation, .. } if correlation.abs() > 0.5);
+    let warm = |f: &CalibrationFinding| matches!(f, CalibrationFinding::Temperature { correlation, .. } if correlation.abs() > 0.5);
     assert!(c.findings.iter().any(warm), "{:?}", c.findings);
 }
 
@@ -491,7 +493,7 @@ fn noise_is_estimated() {
         calibrate(&scheme(&bench, "F,I,O,S"), &conditions(&believed), vec![record], &options, &|_| true)
             .expect("calibrated")
     };
-    assert!(matches!(run(false).findings[..], [Finding::Noise { .. }]));
+    assert!(matches!(run(false).findings[..], [CalibrationFinding::Noise { .. }]));
     let c = run(true);
     is_right(&c);
     assert!(c.assumed.noise_estimated && (c.fit.factor - 1.0).abs() < 1e-2, "{:?}", c.fit);
@@ -564,7 +566,7 @@ fn runs_are_held_against_each_other() {
     other.drift[0][0] += 0.2;
     let changed = both(&other);
     assert!(
-        changed.findings.iter().any(|f| matches!(f, Finding::Repeatability { .. })),
+        changed.findings.iter().any(|f| matches!(f, CalibrationFinding::Repeatability { .. })),
         "{:?}",
         changed.findings
     );
@@ -596,7 +598,7 @@ fn an_interrupt_leaves_what_there_is() {
     let whole = until(usize::MAX, false).expect("calibrated");
     is_right(&whole);
     let c = until(2, false).expect("calibrated");
-    assert_eq!((c.consistent, c.findings.first()), (false, Some(&Finding::Interrupted)));
+    assert_eq!((c.consistent, c.findings.first()), (false, Some(&CalibrationFinding::Interrupted)));
     // two linearisations are near
     for (a, b) in whole.quantities.iter().zip(&c.quantities) {
         let (x, y, s) = (a.estimate.expect("there"), b.estimate.expect("there"), a.sigma.expect("there"));

@@ -14,11 +14,11 @@ pub(super) struct AngleProduct {
 }
 
 /// Factor of a product: a text with the sign of its exponents.
-pub(super) type Factors = Vec<(String, i32)>;
+pub(super) type AngleFactors = Vec<(String, i32)>;
 
 /// Products of powers of `c`, `s`, `1 - c`, `1 + c` and `c^2 - s^2` of each angle, simplest first.
-pub(super) fn products(angles: &[String]) -> Vec<Factors> {
-    let mut out: Vec<(usize, Factors)> = vec![(0, Vec::new())];
+pub(super) fn products(angles: &[String]) -> Vec<AngleFactors> {
+    let mut out: Vec<(usize, AngleFactors)> = vec![(0, Vec::new())];
     for angle in angles {
         let atoms = [
             (format!("c_{angle}"), 1),
@@ -28,7 +28,7 @@ pub(super) fn products(angles: &[String]) -> Vec<Factors> {
             (format!("(c_{angle}^2-s_{angle}^2)"), 2),
         ];
         for (atom, weight) in atoms {
-            let powers = |(complexity, product): &(usize, Factors)| -> Vec<(usize, Factors)> {
+            let powers = |(complexity, product): &(usize, AngleFactors)| -> Vec<(usize, AngleFactors)> {
                 let most = ((COMPLEXITY - complexity) / weight) as i32;
                 (-most..=most)
                     .map(|e| {
@@ -44,7 +44,7 @@ pub(super) fn products(angles: &[String]) -> Vec<Factors> {
         }
     }
     // of (1-c)/s and s/(1+c), which are equal, the second, as the symbolic engine prints it
-    let differences = |product: &Factors| product.iter().filter(|f| f.0.starts_with("(1-")).count();
+    let differences = |product: &AngleFactors| product.iter().filter(|f| f.0.starts_with("(1-")).count();
     out.sort_by_key(|(complexity, product)| {
         (*complexity, product.iter().filter(|f| f.1 < 0).count(), product.len(), differences(product))
     });
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(all.len(), one.len());
         assert!(one.contains(&vec![("c_0".into(), 1), ("s_0".into(), -1)]));
         let place = |factors: &[(&str, i32)]| {
-            let product: Factors = factors.iter().map(|(base, e)| (base.to_string(), *e)).collect();
+            let product: AngleFactors = factors.iter().map(|(base, e)| (base.to_string(), *e)).collect();
             one.iter().position(|p| *p == product).expect("a product")
         };
         assert!(place(&[("s_0", 1), ("(1+c_0)", -1)]) < place(&[("s_0", -1), ("(1-c_0)", 1)]));

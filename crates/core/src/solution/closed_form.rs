@@ -1,7 +1,7 @@
 //! Numbers of a solution as short products of sines and cosines, recovered from their images in the prime
 //! fields without the symbolic engine.
 
-use super::angle_products::{AngleProduct, Factors, power, products, text};
+use super::angle_products::{AngleFactors, AngleProduct, power, products, text};
 use super::ask::radical_text;
 use super::solver::Solver;
 use super::tables::RowTable;
@@ -13,7 +13,7 @@ impl Solver<'_> {
         if self.too_many_angles() {
             return Vec::new();
         }
-        let product = |powers: Factors| {
+        let product = |powers: AngleFactors| {
             let part = |up: bool| -> Vec<String> {
                 powers.iter().filter(|f| (f.1 > 0) == up).map(|(base, e)| power(base, *e)).collect()
             };

@@ -53,7 +53,7 @@ pub(super) struct Adjoint<'a, S: Values> {
     integers: Vec<S::Element>,
     /// Entries of the Jacobian by the slot of their column; `None` if sweeps through the graph take less.
     jacobian: Option<Vec<Vec<JacobianEntry<S>>>>,
-    plan: RefCell<S::Plan>,
+    plan: RefCell<S::SeriesPlan>,
     /// Order of the differentials in `held`.
     order: usize,
     /// Factors of the differentials, by output and slot.

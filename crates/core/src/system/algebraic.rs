@@ -120,7 +120,7 @@ fn expression(nodes: Vec<Node>, length: usize) -> Expression {
 const PRIME: u64 = (1 << 60) + 33;
 
 /// Random values of all names without a definition or given value, and the values that follow.
-struct RandomPoint<'a> {
+struct RandomNameValues<'a> {
     model: &'a SystemModel,
     /// Index of every definition, by name.
     places: &'a HashMap<String, usize>,
@@ -128,7 +128,7 @@ struct RandomPoint<'a> {
     known: &'a RefCell<HashMap<String, Option<u64>>>,
 }
 
-impl Environment for RandomPoint<'_> {
+impl Environment for RandomNameValues<'_> {
     fn name(&self, name: &str) -> Option<u64> {
         if let Some(&value) = self.known.borrow().get(name) {
             return value;
@@ -283,7 +283,7 @@ impl Differentiation<'_> {
     /// True if a definition is zero at a random point.
     fn is_zero(&self, name: &str) -> bool {
         let Self { out: model, places, values: known, .. } = self;
-        RandomPoint { model, places, known }.name(name) == Some(0)
+        RandomNameValues { model, places, known }.name(name) == Some(0)
     }
 
     /// Rates of the algebraic unknowns by elimination in `sum_j J_ij z_j' + r_i = 0`.

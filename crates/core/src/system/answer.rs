@@ -7,12 +7,12 @@ use super::branches::{BranchSide, branches};
 use super::constraints::ConstraintFactor;
 use super::counts::{CountLimits, SolutionCount, Solutions, values_taken};
 use super::error::ModelError;
-use super::function_factors::Factors;
+use super::function_factors::ModelFactors;
 use super::functions::gcd;
 use super::identifiable::{IdentifiableFunctions, identifiable_functions, terms_of};
 use super::judge::{ByDigits, Judgement, SystemCertainty, judge_compiled};
 use super::model::{Compiled, Role, StartTime, StateStart, SystemModel};
-use super::quotients::Terms;
+use super::quotients::QuotientTerms;
 use super::remedies::remedies;
 use super::rows::Unknown;
 use super::solutions::solutions;
@@ -322,8 +322,8 @@ pub(super) struct Analyzed {
     pub(super) analysis: SystemAnalysis,
     pub(super) judged: Judgement,
     /// Identifiable functions, in the order of the invariants of the analysis, and their factors.
-    pub(super) functions: Vec<Terms>,
-    pub(super) factors: Factors,
+    pub(super) functions: Vec<QuotientTerms>,
+    pub(super) factors: ModelFactors,
 }
 
 /// Analysis of a model in continuous time.
@@ -343,7 +343,7 @@ pub(super) fn analyzed(model: &SystemModel, options: SystemOptions) -> Result<An
         number_of_solutions: None,
     }));
     let own = symmetries.invariants.iter().map(terms_of);
-    let listed: Vec<Terms> = own.chain(functions.into_iter().map(|f| f.terms)).collect();
+    let listed: Vec<QuotientTerms> = own.chain(functions.into_iter().map(|f| f.terms)).collect();
     out.missing_functions = missing;
     out.branches = branches(&compiled);
     out.to_resolve = remedies(model, &compiled, &judged, (seed, symmetries.work), order);

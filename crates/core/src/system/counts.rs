@@ -7,12 +7,12 @@ use obsdeg_exact::{Field, SplitMix64, polynomial};
 use super::constraints::slots_of;
 use super::dag::{Dag, Op};
 use super::fibre::{CountingPoint, Fibre, at_point};
-use super::function_factors::Factors;
+use super::function_factors::ModelFactors;
 use super::global::{self, ModelRelations, RelationConsequences};
 use super::judge::Judgement;
 use super::maps::second_solution;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
-use super::quotients::Terms;
+use super::quotients::QuotientTerms;
 use super::rows::SystemRows;
 use super::twins::{Twin, images, twins};
 use super::undecided::{ENOUGH, NotCounted, UNKNOWNS};
@@ -67,7 +67,7 @@ struct SolutionCounting<'a> {
     seed: u64,
     order: usize,
     /// Functions whose values are counted beside those of the unknowns.
-    functions: &'a [Terms],
+    functions: &'a [QuotientTerms],
 }
 
 /// Stage of counting: the equations that it uses.
@@ -213,7 +213,7 @@ impl SolutionCounting<'_> {
             let mut own = self.random(i);
             let point =
                 SystemRows::new(model, compiled, &judged.layout, fields[i], &mut own, &verdict).ok()?;
-            let nodes = Factors::new(model, compiled, &judged.layout).nodes(compiled);
+            let nodes = ModelFactors::new(model, compiled, &judged.layout).nodes(compiled);
             let values = point.values(compiled, &judged.layout, &nodes);
             let mut rng = model.random(seed, &format!("relations, field {i}"));
             let system = (model, compiled, judged);
@@ -339,7 +339,7 @@ pub(super) fn values_taken(
     model: &SystemModel,
     compiled: &Compiled,
     judged: &Judgement,
-    functions: &[Terms],
+    functions: &[QuotientTerms],
     (seed, limits): (u64, CountLimits),
 ) -> Solutions {
     let degrees = &judged.findings.degrees;
@@ -399,13 +399,13 @@ fn role_name(model: &SystemModel, role: Role) -> String {
 
 /// Counts of functions; a function of unknowns with one value each has one value.
 fn with_single(
-    functions: &[Terms],
+    functions: &[QuotientTerms],
     counted: Vec<SolutionCount>,
     unknowns: &[Option<SolutionCount>],
 ) -> Vec<SolutionCount> {
     // factors beyond the unknowns are known values
     let is_single = |c: usize| unknowns.get(c).is_none_or(|count| *count == Some(Ok(1)));
-    let single = |terms: &Terms| terms.iter().flat_map(|t| &t.1).all(|p| is_single(p.0));
+    let single = |terms: &QuotientTerms| terms.iter().flat_map(|t| &t.1).all(|p| is_single(p.0));
     functions.iter().zip(counted).map(|(terms, count)| if single(terms) { Ok(1) } else { count }).collect()
 }
 

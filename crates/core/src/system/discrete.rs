@@ -9,7 +9,7 @@ use super::judge::{Judgement, judge};
 use super::model::{
     Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StartTime, StateStart, SystemModel,
 };
-use super::quotients::Terms;
+use super::quotients::QuotientTerms;
 use crate::degree::status::Status;
 use crate::language::{Expression, Function, Node};
 use crate::remedies::Remedies;
@@ -62,7 +62,7 @@ fn number(n: usize) -> Node {
 }
 
 /// Sum of products of powers of named quantities.
-fn sum(terms: &Terms, factor: &dyn Fn(usize) -> (String, Option<Function>)) -> PlacedExpression {
+fn sum(terms: &QuotientTerms, factor: &dyn Fn(usize) -> (String, Option<Function>)) -> PlacedExpression {
     let mut nodes = vec![number(0)];
     let mut total = 0;
     for (coefficient, powers) in terms {

@@ -20,7 +20,7 @@ impl Values for Field {
     const BITS: i64 = 64;
     const COEFFICIENTS: usize = 800;
 
-    type Plan = Transform;
+    type SeriesPlan = Transform;
 
     fn plan(&self, length: usize) -> Transform {
         Transform::new(*self, length)
@@ -110,7 +110,7 @@ impl<const N: usize> Values for Reals<N> {
     const BITS: i64 = Ball::<N>::BITS;
     const COEFFICIENTS: usize = 200;
 
-    type Plan = ();
+    type SeriesPlan = ();
 
     fn plan(&self, _: usize) {}
 

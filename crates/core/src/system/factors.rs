@@ -29,7 +29,7 @@ struct Factor {
 }
 
 /// Constraint that is a product.
-struct Product {
+struct ConstraintProduct {
     constraint: usize,
     factors: Vec<Factor>,
     /// Index of the factor that is zero at the values of the file.
@@ -45,7 +45,7 @@ impl SystemModel {
     /// was found.
     pub(super) fn by_one_factor(self) -> Self {
         let all = self.constraints.iter().enumerate();
-        let products: Vec<Product> = all.filter_map(|(c, own)| self.product(c, own)).collect();
+        let products: Vec<ConstraintProduct> = all.filter_map(|(c, own)| self.product(c, own)).collect();
         if products.is_empty() {
             return self;
         }
@@ -77,14 +77,14 @@ impl SystemModel {
         best.map_or(self, |(_, out)| out)
     }
 
-    fn product(&self, constraint: usize, own: &PlacedExpression) -> Option<Product> {
+    fn product(&self, constraint: usize, own: &PlacedExpression) -> Option<ConstraintProduct> {
         let factors = factors(own);
         let given = self.zero_at_given(&factors)?;
-        (factors.len() > 1).then_some(Product { constraint, factors, given })
+        (factors.len() > 1).then_some(ConstraintProduct { constraint, factors, given })
     }
 
     /// Replaces a product by one of its factors.
-    fn take(&mut self, of: &Product, taken: usize) {
+    fn take(&mut self, of: &ConstraintProduct, taken: usize) {
         let own = &mut self.constraints[of.constraint];
         own.expression = of.factors[taken].expression.clone();
         let others = of.factors.iter().enumerate().filter(|(k, _)| *k != taken);

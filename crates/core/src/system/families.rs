@@ -1,6 +1,6 @@
 //! Products of powers among which identifiable functions are sought.
 
-use super::function_factors::Factors;
+use super::function_factors::ModelFactors;
 use super::judge::Judgement;
 use super::model::Role;
 use super::quotients::QuotientPowers;
@@ -21,10 +21,10 @@ pub(super) struct ProductFamily {
 }
 
 /// Effect of a scaling on the unknowns, as integer exponents.
-pub(super) type Weight = Vec<(usize, i64)>;
+pub(super) type ScalingExponents = Vec<(usize, i64)>;
 
 /// Effects of the scalings of a model.
-pub(super) fn weights(symmetries: &Symmetries) -> Vec<Weight> {
+pub(super) fn weights(symmetries: &Symmetries) -> Vec<ScalingExponents> {
     let plain = symmetries.found.iter().filter(|s| s.translation.is_empty());
     let weights = plain.map(|s| {
         let numbers: Vec<(i64, i64)> = s.scaling.iter().map(|t| t.1).collect();
@@ -37,9 +37,9 @@ pub(super) fn weights(symmetries: &Symmetries) -> Vec<Weight> {
 /// unknowns and functions of unknowns; polynomials first.
 pub(super) fn families(
     judged: &Judgement,
-    factors: &Factors,
+    factors: &ModelFactors,
     shown: &[bool],
-    weights: &[Weight],
+    weights: &[ScalingExponents],
 ) -> Vec<ProductFamily> {
     let degrees = &judged.findings.degrees;
     let all: Vec<usize> =
@@ -83,7 +83,7 @@ pub(super) fn families(
 impl ProductFamily {
     /// Products of weight zero that contain at least one unknown, short ones first, and among them those with
     /// few divisors; none if there are too many.
-    pub(super) fn products(&self, weights: &[Weight]) -> Vec<QuotientPowers> {
+    pub(super) fn products(&self, weights: &[ScalingExponents]) -> Vec<QuotientPowers> {
         let mut out: Vec<(u32, QuotientPowers)> = vec![(0, Vec::new())];
         for &v in &self.factors {
             let mut longer = Vec::new();
@@ -103,7 +103,7 @@ impl ProductFamily {
             out = longer;
         }
         let weightless = |powers: &[(usize, i32)]| {
-            let weight = |w: &Weight| -> i64 {
+            let weight = |w: &ScalingExponents| -> i64 {
                 let own = |v: usize| w.iter().find(|t| t.0 == v).map_or(0, |t| t.1);
                 powers.iter().map(|&(v, e)| own(v) * i64::from(e)).sum()
             };

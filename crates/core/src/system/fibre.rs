@@ -24,11 +24,11 @@ use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, SplitMix64, polynomial};
 
 use super::dag::Op;
-use super::function_factors::Factors;
+use super::function_factors::ModelFactors;
 use super::global::RelationConsequences;
 use super::judge::Judgement;
 use super::model::{Compiled, Role, SystemModel};
-use super::quotients::{Quotients, Terms};
+use super::quotients::{QuotientTerms, Quotients};
 use super::rows::{Layout, SystemRows, Unknown};
 use super::undecided::{LONGEST, NotCounted};
 use super::work;
@@ -453,7 +453,7 @@ pub(super) struct CountingPoint<'a> {
     /// asks for. For unknowns that are not
     /// observable these are the values while as many of them are fixed as there are unobservable directions.
     /// `None`: only observable unknowns.
-    pub(super) functions: Option<&'a [Terms]>,
+    pub(super) functions: Option<&'a [QuotientTerms]>,
 }
 
 /// Values of the unknowns among all points with the same outputs.
@@ -482,7 +482,7 @@ pub(super) fn at_point(
     let verdict = work::Work::new(model.work_limit);
     let Equations { zero, values, weights, unknowns, rows, .. } =
         equations(model, compiled, judged, at, (&mut *rng, &verdict), &mut *work)?;
-    let factors = Factors::new(model, compiled, &judged.layout);
+    let factors = ModelFactors::new(model, compiled, &judged.layout);
     let known = rows.values(compiled, &judged.layout, &factors.nodes(compiled)).split_off(unknowns.len());
     let degree = &judged.findings.degrees.degree;
     let counted = |unknown: usize| degree[unknown].is_some() || at.functions.is_some();

@@ -21,7 +21,7 @@ pub(super) struct UnknownFunction {
 /// Factors in the order of their numbers: unknowns, known constants, known inputs that are polynomials in
 /// time with their derivatives, functions of one unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Factors {
+pub(super) struct ModelFactors {
     pub(super) unknowns: usize,
     pub(super) constants: usize,
     /// Known inputs, each with the order of its derivative.
@@ -29,7 +29,7 @@ pub(super) struct Factors {
     pub(super) functions: Vec<UnknownFunction>,
 }
 
-impl Factors {
+impl ModelFactors {
     /// Factors of a model. With several experiments there are no inputs and no functions of states, as these
     /// differ between experiments.
     pub(super) fn new(model: &SystemModel, compiled: &Compiled, layout: &Layout) -> Self {

@@ -14,13 +14,13 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 use super::addition::written_apart;
 use super::error::ModelError;
 use super::families::{ProductFamily, families, weights};
-use super::function_factors::Factors;
+use super::function_factors::ModelFactors;
 use super::functions::gcd;
 use super::global::functions_of_constants;
 use super::judge::{Judgement, PointDegrees, SystemCertainty, climb_at};
-use super::lie::{LaurentPolynomial, Motion, terms_of_quotient, variable};
+use super::lie::{FactorRates, LaurentPolynomial, terms_of_quotient, variable};
 use super::model::{Compiled, SystemModel};
-use super::quotients::{QuotientPowers, Terms};
+use super::quotients::{QuotientPowers, QuotientTerms};
 use super::symmetry::{Invariant, Symmetries, integers, rationals};
 use super::work::Spent;
 use crate::degree::sparse::{extend_by_short_vectors, support};
@@ -46,7 +46,7 @@ const RESTRICTED: u32 = 4;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct IdentifiableFunction {
     /// Integer coefficients and products of powers.
-    pub(super) terms: Terms,
+    pub(super) terms: QuotientTerms,
     /// Observable degree of the function.
     pub(super) degree: usize,
 }
@@ -57,7 +57,7 @@ pub(super) struct IdentifiableFunctions {
     /// Number of independent ones that were not found.
     pub(super) missing: usize,
     /// Factors of the functions.
-    pub(super) factors: Factors,
+    pub(super) factors: ModelFactors,
 }
 
 /// Functions beyond the invariants of the symmetries, and the number of missing ones.
@@ -79,12 +79,12 @@ pub(super) fn identifiable_functions(
     let apart = if judged.fields.is_some() { None } else { written_apart(compiled) };
     let compiled = apart.as_ref().unwrap_or(compiled);
     let Some([f, other]) = fields(judged).filter(|_| missing > 0) else {
-        let factors = Factors::new(model, compiled, &judged.layout);
+        let factors = ModelFactors::new(model, compiled, &judged.layout);
         return Ok(IdentifiableFunctions { found: Vec::new(), missing, factors });
     };
     let mut search = FunctionSearch::new(model, compiled, judged, f, seed)?;
     (search.all, search.shown) = (judged.shown_rank, shown);
-    let listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
+    let listed: Vec<QuotientTerms> = symmetries.invariants.iter().map(terms_of).collect();
     for terms in &listed {
         let gradient = search.gradient(terms, search.first());
         search.known.insert(&gradient);
@@ -125,7 +125,7 @@ fn fields(judged: &Judgement) -> Option<[Field; 2]> {
 }
 
 /// Invariant of the symmetries as a sum of products of powers.
-pub(super) fn terms_of(i: &Invariant) -> Terms {
+pub(super) fn terms_of(i: &Invariant) -> QuotientTerms {
     match i.product {
         true => vec![(1, i.terms.iter().map(|&(c, m)| (c, m as i32)).collect())],
         false => i.terms.iter().map(|&(c, m)| (m, vec![(c, 1)])).collect(),
@@ -137,7 +137,7 @@ struct FunctionSearch<'a> {
     model: &'a SystemModel,
     compiled: &'a Compiled,
     judged: &'a Judgement,
-    factors: Factors,
+    factors: ModelFactors,
     f: Field,
     rng: SplitMix64,
     /// Points, with the unobservable directions there.
@@ -168,7 +168,7 @@ impl<'a> FunctionSearch<'a> {
             model,
             compiled,
             judged,
-            factors: Factors::new(model, compiled, &judged.layout),
+            factors: ModelFactors::new(model, compiled, &judged.layout),
             f,
             rng,
             points: Vec::new(),
@@ -269,17 +269,21 @@ impl<'a> FunctionSearch<'a> {
     /// Adds functions among the terms of derivatives along the motion: of the outputs, of observable
     /// unknowns, and of the functions found. The derivative of an identifiable function is identifiable, and
     /// so is the coefficient of every product of inputs in it.
-    fn among_derivatives(&mut self, listed: &[Terms]) -> Result<(), ModelError> {
+    fn among_derivatives(&mut self, listed: &[QuotientTerms]) -> Result<(), ModelError> {
         self.spent = Spent::default();
         for experiment in 0..self.model.experiments.max(1) {
             let system = (self.model, self.compiled, self.judged);
-            let motion = Motion::new(system, &self.factors, self.f, experiment);
+            let motion = FactorRates::new(system, &self.factors, self.f, experiment);
             self.among_derivatives_along(&motion, listed)?;
         }
         Ok(())
     }
 
-    fn among_derivatives_along(&mut self, motion: &Motion, listed: &[Terms]) -> Result<(), ModelError> {
+    fn among_derivatives_along(
+        &mut self,
+        motion: &FactorRates,
+        listed: &[QuotientTerms],
+    ) -> Result<(), ModelError> {
         let degrees = &self.judged.findings.degrees.degree;
         let observable = (0..degrees.len()).filter(|&c| degrees[c].is_some() && self.shown[c]);
         let mut open: Vec<LaurentPolynomial> = observable.map(|c| variable(&self.f, c)).collect();
@@ -326,7 +330,7 @@ impl<'a> FunctionSearch<'a> {
     }
 
     /// Keeps a function if it is identifiable and independent of those before it.
-    fn keep(&mut self, mut terms: Terms) {
+    fn keep(&mut self, mut terms: QuotientTerms) {
         // known factors of all terms say nothing
         let known = common_factor(&terms).into_iter().filter(|p| self.factors.unknown(p.0).is_none());
         let known: QuotientPowers = known.collect();
@@ -343,7 +347,7 @@ impl<'a> FunctionSearch<'a> {
     }
 
     /// Unknowns without one for each function found so far, as the function expresses it by the others.
-    fn not_expressed(&self, listed: &[Terms]) -> Vec<usize> {
+    fn not_expressed(&self, listed: &[QuotientTerms]) -> Vec<usize> {
         let degrees = &self.judged.findings.degrees;
         let mut left: Vec<usize> =
             (0..degrees.degree.len()).filter(|&c| degrees.excited[c] && self.shown[c]).collect();
@@ -376,7 +380,7 @@ impl<'a> FunctionSearch<'a> {
 }
 
 /// Powers that divide all terms.
-fn common_factor(terms: &Terms) -> QuotientPowers {
+fn common_factor(terms: &QuotientTerms) -> QuotientPowers {
     let Some((first, others)) = terms.split_first() else { return Vec::new() };
     let smallest = |&(c, e): &(usize, i32)| {
         let exponents = others.iter().map(|t| t.1.iter().find(|p| p.0 == c).map_or(0, |p| p.1));
@@ -403,7 +407,7 @@ fn product(f: &Field, powers: &[(usize, i32)], values: &[u64], inverses: &[u64])
 /// Differential of a function at a point (shape: unknowns).
 fn gradient(
     f: &Field,
-    factors: &Factors,
+    factors: &ModelFactors,
     terms: &[(i64, QuotientPowers)],
     at: &PointDegrees<Field>,
 ) -> Vec<u64> {

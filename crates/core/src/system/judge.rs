@@ -8,7 +8,7 @@ use super::branches::{BranchSide, Signs, sided, sides};
 use super::constraints::slots_of;
 use super::dag::{Dag, Op};
 use super::error::ModelError;
-use super::function_factors::Factors;
+use super::function_factors::ModelFactors;
 use super::independent::independent_functions;
 use super::model::{Compiled, MAX_UNKNOWNS, Role, StartTime, SystemModel};
 use super::real_points::{dependent_at_points, real_point};
@@ -143,7 +143,7 @@ pub(crate) struct PointDegrees<S: Values> {
     pub(crate) combinations: Vec<Verdict>,
     /// Span of all rows.
     pub(crate) span: S::Space,
-    /// Value of every unknown at the point, then of the nodes of [`Factors`].
+    /// Value of every unknown at the point, then of the nodes of [`ModelFactors`].
     pub(crate) values: Vec<S::Element>,
     /// True if the last order is proven to be the last.
     ended: bool,
@@ -257,7 +257,7 @@ fn climbed<S: Values>(
         })
         .collect();
     let rows = rows.rows;
-    let nodes = Factors::new(model, compiled, layout).nodes(compiled);
+    let nodes = ModelFactors::new(model, compiled, layout).nodes(compiled);
     for (node, order) in nodes.iter().flatten().filter(|n| n.1 > 0) {
         rows.coefficient(0, *node, *order);
     }

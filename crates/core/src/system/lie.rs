@@ -7,10 +7,10 @@ use obsdeg_exact::multivariate::{Monomial, Polynomial};
 use obsdeg_exact::{Field, Scalars};
 
 use super::dag::Op;
-use super::function_factors::Factors;
+use super::function_factors::ModelFactors;
 use super::judge::Judgement;
 use super::model::{Compiled, KnownInput, Role, SystemModel};
-use super::quotients::{QuotientPowers, Terms};
+use super::quotients::{QuotientPowers, QuotientTerms};
 use super::rows::Unknown;
 use super::values::Values;
 
@@ -71,7 +71,7 @@ pub(super) fn variable(f: &Field, v: usize) -> LaurentPolynomial {
 }
 
 /// Rates of change of the factors of a model, where they are polynomials in factors and inputs.
-pub(super) struct Motion {
+pub(super) struct FactorRates {
     f: Field,
     /// Rate of change by factor; `None` if it is no such polynomial.
     rates: Vec<Option<LaurentPolynomial>>,
@@ -81,11 +81,11 @@ pub(super) struct Motion {
     pub(super) outputs: Vec<LaurentPolynomial>,
 }
 
-impl Motion {
+impl FactorRates {
     /// The motion of an experiment of a model: states of the others stand still.
     pub(super) fn new(
         system: (&SystemModel, &Compiled, &Judgement),
-        factors: &Factors,
+        factors: &ModelFactors,
         f: Field,
         experiment: usize,
     ) -> Self {
@@ -156,7 +156,7 @@ impl Motion {
     }
 
     /// Function as a polynomial.
-    pub(super) fn polynomial(&self, terms: &Terms) -> LaurentPolynomial {
+    pub(super) fn polynomial(&self, terms: &QuotientTerms) -> LaurentPolynomial {
         let f = &self.f;
         terms.iter().map(|(c, powers)| (powers.clone(), f.from_i64(*c))).collect()
     }
@@ -165,7 +165,7 @@ impl Motion {
 /// Every node as a polynomial in factors and inputs; `None` for another node.
 fn nodes(
     (model, compiled, judged): (&SystemModel, &Compiled, &Judgement),
-    factors: &Factors,
+    factors: &ModelFactors,
     f: &Field,
     experiment: usize,
 ) -> Vec<Option<LaurentPolynomial>> {
@@ -221,7 +221,7 @@ fn nodes(
 
 /// Terms with integer coefficients, up to a common factor; `None` if there are many, or some are not
 /// rational.
-fn with_integers(f: &Field, terms: &[(Monomial, u64)]) -> Option<Terms> {
+fn with_integers(f: &Field, terms: &[(Monomial, u64)]) -> Option<QuotientTerms> {
     if terms.len() > GIVEN {
         return None;
     }
@@ -233,7 +233,7 @@ fn with_integers(f: &Field, terms: &[(Monomial, u64)]) -> Option<Terms> {
 }
 
 /// Quotient as terms, or its inverse; `None` if both parts have several terms.
-pub(super) fn terms_of_quotient(f: &Field, [above, below]: &[Polynomial; 2]) -> Option<Terms> {
+pub(super) fn terms_of_quotient(f: &Field, [above, below]: &[Polynomial; 2]) -> Option<QuotientTerms> {
     let (sum, one) = if below.len() == 1 { (above, below) } else { (below, above) };
     let (divisor, _) = one.terms().next().filter(|_| one.len() == 1)?;
     let terms: Vec<(Monomial, u64)> = sum.terms().map(|(m, c)| (m.clone(), c)).collect();

@@ -37,12 +37,12 @@ const VANISHES: f64 = -16.0;
 const LONGEST: f64 = 6.0;
 
 /// Constraint as a sum of terms; true marks a subtracted term.
-struct Sum {
+struct ConstraintSum {
     node: usize,
     terms: Vec<(bool, usize)>,
 }
 
-impl Sum {
+impl ConstraintSum {
     fn new(dag: &Dag, node: usize) -> Self {
         let (mut terms, mut open) = (Vec::new(), vec![(false, node)]);
         while let Some((minus, i)) = open.pop() {
@@ -101,7 +101,7 @@ struct Linear<const N: usize> {
 
 impl<const N: usize> Linear<N> {
     /// Adds the next constraint; `here` are the values of the slots by which it is derived.
-    fn add(&mut self, sum: &Sum, at: &Taylor<'_, Reals<N>>, here: &[Ball<N>]) {
+    fn add(&mut self, sum: &ConstraintSum, at: &Taylor<'_, Reals<N>>, here: &[Ball<N>]) {
         let (sides, slopes) = sum.sides(at, here.len());
         let row: Vec<Ball<N>> = slopes[0].iter().zip(&slopes[1]).map(|(a, b)| a.sub(b)).collect();
         let ratio = ratio(&sides, &slopes);
@@ -137,7 +137,7 @@ struct ConstraintRow<const N: usize> {
 /// Constraints and free slots of Newton's steps.
 struct Newton<'a> {
     dag: &'a Dag,
-    sums: Vec<Sum>,
+    sums: Vec<ConstraintSum>,
     places: Vec<usize>,
     work: &'a Work,
 }
@@ -326,8 +326,12 @@ pub(super) fn hold_by_newton<const N: usize>(
     work: &Work,
 ) -> Result<(), ConstraintFailure> {
     let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
-    let newton =
-        Newton { dag, sums: constraints.iter().map(|&node| Sum::new(dag, node)).collect(), places, work };
+    let newton = Newton {
+        dag,
+        sums: constraints.iter().map(|&node| ConstraintSum::new(dag, node)).collect(),
+        places,
+        work,
+    };
     // a refusal holds for all later steps
     let failed =
         |reason| work.take(WorkStep::Constraints, 0, 0).map_or(ConstraintFailure::Refused, |()| reason);
@@ -377,7 +381,7 @@ pub(super) fn vanishing<const N: usize>(
 ) -> Option<usize> {
     let places: Vec<usize> = (0..values.len()).filter(|&s| free[s]).collect();
     (0..constraints.len()).find(|&c| {
-        let sums = vec![Sum::new(dag, constraints[c])];
+        let sums = vec![ConstraintSum::new(dag, constraints[c])];
         let linear = Newton { dag, sums, places: places.clone(), work }.linear(values);
         linear.is_some_and(|at| at.off < HELD && at.off - at.shift < VANISHES)
     })
@@ -390,6 +394,6 @@ pub(super) fn off<const N: usize>(
     values: &[Ball<N>],
     work: &Work,
 ) -> Option<f64> {
-    let sums = constraints.iter().map(|&node| Sum::new(dag, node)).collect();
+    let sums = constraints.iter().map(|&node| ConstraintSum::new(dag, node)).collect();
     Some(Newton { dag, sums, places: Vec::new(), work }.linear(values)?.off)
 }

@@ -19,7 +19,7 @@ const REMAINDER: u64 = 100_000;
 pub(super) type QuotientPowers = Vec<(usize, i32)>;
 
 /// Sum of products of powers with integer coefficients.
-pub(super) type Terms = Vec<(i64, QuotientPowers)>;
+pub(super) type QuotientTerms = Vec<(i64, QuotientPowers)>;
 
 /// Quotient ring of equations by their Groebner basis.
 pub(super) struct Quotients<'a> {
@@ -74,7 +74,7 @@ impl Quotients<'_> {
     /// Element of the ring for a function of the unknowns.
     pub(super) fn function(
         &mut self,
-        terms: &Terms,
+        terms: &QuotientTerms,
         unknowns: &[Polynomial],
         work: &mut RemainingWork,
     ) -> Result<Polynomial, NotCounted> {

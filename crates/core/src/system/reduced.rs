@@ -18,7 +18,7 @@ use super::model::{
     Constant, KnownInput, Named, PlacedExpression, Role, StartTime, State, StateStart, SystemModel,
 };
 use super::model_file;
-use super::quotients::Terms;
+use super::quotients::QuotientTerms;
 use super::symmetry::symmetries;
 
 /// Reasons for the lack of a reduced model.
@@ -68,7 +68,7 @@ pub fn reduced(model: &SystemModel, seed: u64, order: Option<usize>) -> Result<R
     let unknowns = fixed_unknowns(&judged, span);
     let symmetries = symmetries(model, &compiled, &judged, seed)?;
     let functions = identifiable_functions(model, &compiled, &judged, &symmetries, seed)?.found;
-    let mut listed: Vec<Terms> = symmetries.invariants.iter().map(terms_of).collect();
+    let mut listed: Vec<QuotientTerms> = symmetries.invariants.iter().map(terms_of).collect();
     listed.extend(functions.iter().map(|f| f.terms.clone()));
     let ones = unknowns.iter().map(|&l| (l, 1)).collect::<Vec<_>>();
     let primes = unknowns.iter().copied().zip([2, 3, 5, 7, 11, 13, 17, 19, 23, 29].into_iter().cycle());
@@ -126,7 +126,7 @@ fn fixed_unknowns(judged: &Judgement, span: &Echelon) -> Vec<usize> {
 
 /// Function that an unknown represents when the fixed ones are one: a product in which it is the only other
 /// factor.
-fn stands_for(terms: &Terms, fixed: &[(usize, i64)], judged: &Judgement) -> Option<(String, String)> {
+fn stands_for(terms: &QuotientTerms, fixed: &[(usize, i64)], judged: &Judgement) -> Option<(String, String)> {
     let [(1, powers)] = &terms[..] else { return None };
     let is_fixed = |unknown: usize| fixed.iter().any(|f| f.0 == unknown);
     let mut others = powers.iter().filter(|p| !is_fixed(p.0));

@@ -47,15 +47,15 @@ pub(crate) trait Values: Scalars {
     const COEFFICIENTS: usize;
 
     /// Precomputed data for products of series.
-    type Plan: Clone + std::fmt::Debug;
+    type SeriesPlan: Clone + std::fmt::Debug;
 
     /// Plan for series of this length.
-    fn plan(&self, length: usize) -> Self::Plan;
+    fn plan(&self, length: usize) -> Self::SeriesPlan;
     /// For each list of `(index, key, factor)` the first `n` coefficients of the sum of the products of
     /// `of[index]` and the factor, which the plan knows by its key; `None` if there is none of these.
     fn sums<'a>(
         &self,
-        plan: &mut Self::Plan,
+        plan: &mut Self::SeriesPlan,
         of: &[Option<&'a [Self::Element]>],
         lists: &[Vec<KeyedFactor<'a, Self::Element>>],
         n: usize,

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use obsdeg_core::model::slew::Slew;
 use obsdeg_core::model::{Dwell, Platform, Position, Scheme, SlewTo, angles_text, c_n_f64};
-use obsdeg_evidence::requirements::{Basis, Miss, RequirementClaim, Requirements, Worst};
+use obsdeg_evidence::requirements::{Miss, RequirementClaim, Requirements, SigmaSource, Worst};
 use obsdeg_evidence::simulation::{Attained, Conditions, KnownCovariance, SimulationError, is_rate, resolve};
 
 use super::answer::{AddedPosition, AttitudeBound, Meeting, Quickest, Standing};
@@ -185,7 +185,7 @@ impl Compared<'_> {
             columns.iter().map(|&c| attained.prediction.unknowns[c].degree).collect();
         let mut requirements = attained.requirements(self.conditions)?;
         if self.options.beforehand.is_some() {
-            requirements.basis = Basis::PredictedWithPrior;
+            requirements.basis = SigmaSource::PredictedWithPrior;
             // every coefficient rests on the calibration, as the answer states
             requirements.on_prior.clear();
         }
@@ -255,7 +255,7 @@ impl Compared<'_> {
             required: Some(limits[c]).filter(|r| !r.is_nan()),
             sigma: known.sigma(&names[c]).ok_or(Miss::NotObservable),
         });
-        let requirements = Requirements::of(Basis::PredictedWithPrior, claims);
+        let requirements = Requirements::of(SigmaSource::PredictedWithPrior, claims);
         let of_rate =
             |name: &&String| names.iter().position(|n| n == *name).is_some_and(|c| is_rate(units[c]));
         let rates = self.required.iter().filter(of_rate);

@@ -10,7 +10,7 @@ use obsdeg_core::model::{
 use obsdeg_exact::{Echelon, SplitMix64};
 
 use super::equations::{ANY, PSI_C, everywhere};
-use super::{AuditError, Finding, Line, finding, line};
+use super::{AuditError, AuditFinding, Line, finding, line};
 
 /// Scheme of `n` positions at generic angles.
 fn generic(n: usize, carry: Carry) -> Scheme {
@@ -259,9 +259,9 @@ fn first_derivative_line(p1p2: &SchemeDegrees, seed: u64) -> Result<Line, Analys
     let from = [platform?, inertial?, reset?];
     let at_paper = p1p2.of_coefficients(|n| !input_axis(n)).into_iter().flatten().all(|d| d <= 1);
     let found = match (at_paper, from.iter().all(Option::is_some)) {
-        (true, true) => Finding::Agree,
-        (false, true) => Finding::Conditional,
-        _ => Finding::Disagree,
+        (true, true) => AuditFinding::Agree,
+        (false, true) => AuditFinding::Conditional,
+        _ => AuditFinding::Disagree,
     };
     let fewest = Carry::ALL.into_iter().zip(from).map(|(carry, n)| {
         n.map_or(format!("not up to {} under {carry}", ATTITUDES - 1), |n| format!("{n} under {carry}"))
@@ -327,9 +327,9 @@ fn zero_order_line(p1p2: &SchemeDegrees, seed: u64) -> Result<Line, AnalysisErro
         "section 2.2",
         "eps_z - wN psi_y(0) has the degree of the zero-order coefficients, a better one than the D_I",
         match (same(p1p2), enough) {
-            (true, true) => Finding::Agree,
-            (false, true) => Finding::Conditional,
-            _ => Finding::Disagree,
+            (true, true) => AuditFinding::Agree,
+            (false, true) => AuditFinding::Conditional,
+            _ => AuditFinding::Disagree,
         },
         format!(
             "it has {}; at the paper's p1 p2 D_FX, D_FY, D_FZ: {list}; at six generic positions, platform \

@@ -10,13 +10,13 @@ use obsdeg_core::model::{
 use obsdeg_core::solution::CombinationError;
 use obsdeg_exact::{Field, RootField, SplitMix64};
 
-use super::{Finding, Line, finding, line};
+use super::{AuditFinding, Line, finding, line};
 
 /// Number of random points at which an identity is tested, each in a random prime field of its own.
 const POINTS: usize = 6;
 
 /// Random point (angles, rates, psi and the twelve coefficients) with the values of the model there.
-pub(super) struct RandomPoint {
+pub(super) struct RandomModelPoint {
     pub(super) field: Field,
     /// `C_c^n`.
     pub(super) attitude: Matrix3<u64>,
@@ -25,7 +25,7 @@ pub(super) struct RandomPoint {
     names: Vec<(String, u64)>,
 }
 
-impl RandomPoint {
+impl RandomModelPoint {
     /// Value of a formula at this point.
     pub(super) fn value(&self, text: &str) -> Result<u64, AnalysisError> {
         let wrap = |e: ExpressionError| CombinationError {
@@ -43,7 +43,7 @@ impl RandomPoint {
     }
 }
 
-impl Environment for RandomPoint {
+impl Environment for RandomModelPoint {
     fn name(&self, name: &str) -> Option<u64> {
         self.names.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
     }
@@ -59,7 +59,7 @@ impl Environment for RandomPoint {
 /// and `gx gy gz` in c, `px py pz`, `ex ey ez` (psi, eps) in n, `cx cy cz` eps in c, `Z1 Z3` with `p`, `pp`
 /// for derivatives, `Zcx..` for Z in c, `pxp pyp pzp` for psi' in n. `t q h` are random numbers, `rx ry rz` a
 /// random rate.
-pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<RandomPoint, AnalysisError> {
+pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<RandomModelPoint, AnalysisError> {
     let angles = parse_attitude(attitude)
         .unwrap_or_else(|_| std::array::from_fn(|_| obsdeg_core::model::Angle::from_degrees(0)));
     let platform = Platform::new(Scheme::of_angles([angles]))?;
@@ -108,7 +108,7 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<RandomPoint, An
     for (name, value) in ["Zcx", "Zcy", "Zcz"].into_iter().zip(to_c(z_n)) {
         put(name, value);
     }
-    Ok(RandomPoint {
+    Ok(RandomModelPoint {
         field: f,
         attitude: *c,
         angles: platform.scheme().positions[0]
@@ -124,7 +124,7 @@ pub(super) fn at(attitude: &str, rng: &mut SplitMix64) -> Result<RandomPoint, An
 pub(super) fn everywhere(
     attitude: &str,
     seed: u64,
-    mut holds: impl FnMut(&RandomPoint) -> Result<bool, AnalysisError>,
+    mut holds: impl FnMut(&RandomModelPoint) -> Result<bool, AnalysisError>,
 ) -> Result<bool, AnalysisError> {
     let mut rng = SplitMix64::new(seed);
     for _ in 0..POINTS {
@@ -302,7 +302,7 @@ fn psi_y_line(seed: u64) -> Result<Line, AnalysisError> {
         (identity(ANY, &[(left, right)], seed)?, identity(ANY, &[(curved, right)], seed)?);
     let (finding, reason) = match (constant, varying) {
         (true, false) => (
-            Finding::Conditional,
+            AuditFinding::Conditional,
             format!("while psi_y' is constant {}; when it changes with time it is none", plain(true)),
         ),
         _ => (finding(constant), plain(constant)),

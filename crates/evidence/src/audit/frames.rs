@@ -5,8 +5,8 @@ use obsdeg_core::analysis::AnalysisError;
 use obsdeg_core::model::{GYROS, Matrix3, SignedAxis, elementary, product};
 use obsdeg_exact::Field;
 
-use super::equations::{ANY, G, PSI_C, RandomPoint, everywhere, plain};
-use super::{Finding, Line, finding, line};
+use super::equations::{ANY, G, PSI_C, RandomModelPoint, everywhere, plain};
+use super::{AuditFinding, Line, finding, line};
 
 fn transpose(a: &Matrix3<u64>) -> Matrix3<u64> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
@@ -47,7 +47,7 @@ fn identity(f: &Field) -> Matrix3<u64> {
 /// True if a polynomial of degree two in a small quantity has no terms of degree 0 and 1: its value at the
 /// random size h of the point is `h^2` times its value at 1.
 fn of_second_order(
-    at: &RandomPoint,
+    at: &RandomModelPoint,
     polynomial: impl Fn(u64) -> Matrix3<u64>,
 ) -> Result<bool, AnalysisError> {
     let (f, h) = (&at.field, at.value("h")?);
@@ -67,7 +67,7 @@ const RATES: [&str; 3] = ["wN", "wU", "0"];
 
 /// True if psi has the derivative of (2), to first order in psi and eps. The platform turns with
 /// `omega_c + eps` in inertial space, the computed frame with `omega_c`.
-fn kinematics(at: &RandomPoint, minus: bool) -> Result<bool, AnalysisError> {
+fn kinematics(at: &RandomModelPoint, minus: bool) -> Result<bool, AnalysisError> {
     let f = &at.field;
     let (psi, eps, rate) = (at.vector(PSI)?, at.vector(EPS)?, at.vector(["rx", "ry", "rz"])?);
     let derivative = sum(f, &cross(f, &psi, &rate), &eps);
@@ -162,9 +162,9 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
         ),
     );
     let finding = match (every(&minus), every(&minus_reversed)) {
-        (true, true) => Finding::Agree,
-        (false, false) => Finding::Disagree,
-        _ => Finding::Conditional,
+        (true, true) => AuditFinding::Agree,
+        (false, false) => AuditFinding::Disagree,
+        _ => AuditFinding::Conditional,
     };
     let reason = format!(
         "when eps is positive about +I, {} with -g^c gives the drift of (22), (27), (28), {} with +g^c; when \
@@ -180,7 +180,7 @@ fn mounting_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
 
 /// Derivative of eps in c while c turns with `rate` against n: the first-order terms take
 /// `g^c' = g^c x rate`.
-fn drift_rate(at: &RandomPoint, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
+fn drift_rate(at: &RandomModelPoint, rate: &[u64; 3]) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let [x, y, z] = cross(f, &at.vector(GRAVITY)?, rate);
     let d = |name: &str| at.value(name);
@@ -221,7 +221,7 @@ fn euler_conventions(seed: u64) -> Result<Vec<usize>, AnalysisError> {
 }
 
 /// Rates of n against c, `omega_nc = omega_c - C_n^c omega_ie`, at the `omega_c` of (7) or at a random one.
-fn rate_of_c(at: &RandomPoint, tracks: bool) -> Result<[u64; 3], AnalysisError> {
+fn rate_of_c(at: &RandomModelPoint, tracks: bool) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let earth = apply(f, &transpose(&at.attitude), &at.vector(RATES)?);
     let commanded = if tracks { earth } else { at.vector(["rx", "ry", "rz"])? };
@@ -265,7 +265,7 @@ fn turn_lines(seed: u64) -> Result<[Line; 2], AnalysisError> {
 }
 
 /// Output of the accelerometers, `C_n^p (-g^n) = -C_c^p C_n^c g^n`.
-fn output(at: &RandomPoint) -> Result<[u64; 3], AnalysisError> {
+fn output(at: &RandomModelPoint) -> Result<[u64; 3], AnalysisError> {
     let f = &at.field;
     let to_p = product(f, &small_turn(f, &at.vector(PSI)?, f.one(), true), &transpose(&at.attitude));
     Ok(apply(f, &to_p, &[0, f.one(), 0]))

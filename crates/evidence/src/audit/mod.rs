@@ -23,7 +23,8 @@ pub const SCHEMA: &str = "obsdeg.audit/1";
 /// Outcome of checking an equation or claim of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Finding {
+#[schemars(rename = "Finding")]
+pub enum AuditFinding {
     /// True as printed in the paper.
     Agree,
     /// True under a condition that the paper does not state; the reason states it.
@@ -42,7 +43,7 @@ pub struct Line {
     /// Equation or claim, in words.
     pub claim: String,
     /// Outcome: agree, conditional, disagree or not covered.
-    pub finding: Finding,
+    pub finding: AuditFinding,
     /// Reason of the outcome: the computation, for a slip the correction, and for a line that is not covered
     /// the cause.
     pub reason: String,
@@ -125,16 +126,18 @@ pub fn audit(seed: u64) -> Result<Audit, AuditError> {
     lines.extend(claims::section_2(seed)?);
     lines.extend(simulated::lines(seed)?);
     lines.extend(claims::conclusions(seed)?);
-    lines.extend(NOT_COVERED.map(|[place, claim, why]| line(place, claim, Finding::NotCovered, why.into())));
+    lines.extend(
+        NOT_COVERED.map(|[place, claim, why]| line(place, claim, AuditFinding::NotCovered, why.into())),
+    );
     Ok(Audit { schema: SCHEMA.into(), seed, lines })
 }
 
-fn line(place: &str, claim: &str, finding: Finding, reason: String) -> Line {
+fn line(place: &str, claim: &str, finding: AuditFinding, reason: String) -> Line {
     Line { place: place.into(), claim: claim.into(), finding, reason }
 }
 
-fn finding(holds: bool) -> Finding {
-    if holds { Finding::Agree } else { Finding::Disagree }
+fn finding(holds: bool) -> AuditFinding {
+    if holds { AuditFinding::Agree } else { AuditFinding::Disagree }
 }
 
 #[cfg(test)]
@@ -145,10 +148,11 @@ mod tests {
     /// lines, whatever the seed.
     #[test]
     fn the_findings_are_these() {
-        use Finding::{Conditional, Disagree, NotCovered};
+        use AuditFinding::{Conditional, Disagree, NotCovered};
         for seed in [1, 2, 99] {
             let audit = audit(seed).expect("computed");
-            let agree = audit.lines.iter().filter(|l| l.finding == Finding::Agree).map(|l| l.place.as_str());
+            let agree =
+                audit.lines.iter().filter(|l| l.finding == AuditFinding::Agree).map(|l| l.place.as_str());
             let equations = "(1) (2) (3) (6) (8) (9) (10) (11) (12) (13) (14) (15) (16) (17) (18) (19) (20) \
                 (22) (24) (25) (27) (28)";
             let claims = [["section 2.2"; 4].as_slice(), &["section 3.3"; 5], &["conclusion 2"]].concat();
@@ -157,7 +161,7 @@ mod tests {
                 [equations.split(' ').collect(), claims].concat(),
                 "{audit:#?}"
             );
-            let rest = audit.lines.iter().filter(|l| l.finding != Finding::Agree);
+            let rest = audit.lines.iter().filter(|l| l.finding != AuditFinding::Agree);
             assert_eq!(
                 rest.map(|l| (l.place.as_str(), l.finding)).collect::<Vec<_>>(),
                 [
@@ -192,7 +196,7 @@ mod tests {
     #[test]
     fn no_equation_is_left_out() {
         let audit = audit(3).expect("computed");
-        let judged = audit.lines.iter().filter(|l| l.finding != Finding::NotCovered);
+        let judged = audit.lines.iter().filter(|l| l.finding != AuditFinding::NotCovered);
         let numbers = judged.filter_map(|l| l.place.trim_matches(['(', ')']).parse::<usize>().ok());
         assert_eq!(numbers.collect::<Vec<_>>(), (1..=28).collect::<Vec<_>>());
     }

@@ -9,7 +9,7 @@ use obsdeg_core::model::slew::W_IE;
 use obsdeg_core::model::{Carry, Scheme};
 
 use super::claims::{PAPER, SchemeDegrees, positions, segment_1, show};
-use super::{AuditError, Finding, Line, finding, line};
+use super::{AuditError, AuditFinding, Line, finding, line};
 use crate::prediction::Prediction;
 use crate::simulation::conditions::Conditions;
 use crate::simulation::record::{RunRecord, RunStart, Series, run};
@@ -167,11 +167,11 @@ fn psi_y(mean: &MeanRun, segment: usize) -> (bool, String) {
 }
 
 /// Finding from the outcomes under the three carries: conditional if they differ.
-fn under(holds: [bool; 3]) -> Finding {
+fn under(holds: [bool; 3]) -> AuditFinding {
     match holds {
-        [true, true, true] => Finding::Agree,
-        [false, false, false] => Finding::Disagree,
-        _ => Finding::Conditional,
+        [true, true, true] => AuditFinding::Agree,
+        [false, false, false] => AuditFinding::Disagree,
+        _ => AuditFinding::Conditional,
     }
 }
 
@@ -277,9 +277,9 @@ fn whole(mean: &MeanRun, seed: u64) -> Result<Line, SimulationError> {
     let (consistent, v) = (linear.consistency.consistent, &linear.validity);
     let real = v.holds && exact.consistency.consistent;
     let finding = match (consistent, real) {
-        (true, true) => Finding::Agree,
-        (true, false) => Finding::Conditional,
-        (false, _) => Finding::Disagree,
+        (true, true) => AuditFinding::Agree,
+        (true, false) => AuditFinding::Conditional,
+        (false, _) => AuditFinding::Disagree,
     };
     let word = |b: bool| if b { "consistent" } else { "not consistent" };
     let prior =

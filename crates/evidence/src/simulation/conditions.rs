@@ -12,7 +12,7 @@ use obsdeg_ekf::SensorNoise;
 
 use super::datasheet::GyroNoise;
 use super::error::SimulationError;
-use crate::requirements::Basis;
+use crate::requirements::SigmaSource;
 
 /// Conditions of a run: everything that it needs besides the scheme.
 #[derive(Debug, Clone, PartialEq)]
@@ -231,8 +231,8 @@ impl Conditions {
     }
 
     /// Basis of a prediction under these conditions.
-    pub fn basis(&self) -> Basis {
-        if self.stated_priors().is_empty() { Basis::Predicted } else { Basis::PredictedWithPrior }
+    pub fn basis(&self) -> SigmaSource {
+        if self.stated_priors().is_empty() { SigmaSource::Predicted } else { SigmaSource::PredictedWithPrior }
     }
 
     /// Stated priors in words, such as `psi 0.05, D_F 20`, each in the unit of its unknown; `None` where none

@@ -20,7 +20,7 @@ use super::reports::{conditions_report, timeline_report};
 use super::seen::predict_run;
 use super::start::RunStart;
 use crate::prediction::{PredictedCombination, Prediction};
-use crate::requirements::{Basis, Miss, RequirementClaim, Requirements, meets};
+use crate::requirements::{Miss, RequirementClaim, Requirements, SigmaSource, meets};
 use crate::simulation::omitted::omitted_effects;
 
 /// Simulates one run of `scheme`: the summary and the time series.
@@ -157,7 +157,7 @@ fn run_requirements(
         };
         RequirementClaim { name: &q.name, required: q.required_sigma, sigma }
     });
-    let mut requirements = Requirements::of(Basis::Run, claims);
+    let mut requirements = Requirements::of(SigmaSource::Run, claims);
     requirements.with_bench = bench.ncols() > 0;
     let ratio = |q: &Estimate| {
         let ratio = q.sigma / q.predicted_sigma?;

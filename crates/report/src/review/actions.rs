@@ -1,7 +1,7 @@
 //! Recommended actions by the findings on a scheme, a model or a calibration.
 
 use obsdeg_calibration::Calibration;
-use obsdeg_calibration::answer::{CellKind, ClockRate, Estimated, Finding, PositionFit};
+use obsdeg_calibration::answer::{CalibrationFinding, CellKind, ClockRate, Estimated, PositionFit};
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{NumberOfSolutions, SystemQuantity};
 use obsdeg_design::review::{ModelReview, SchemeReview};
@@ -325,7 +325,7 @@ fn missed_requirements(c: &Calibration) -> Vec<String> {
 fn at_positions(c: &Calibration) -> String {
     let unfit: Vec<&PositionFit> = (c.findings.iter())
         .filter_map(|f| match f {
-            Finding::Position { record, position, .. } => {
+            CalibrationFinding::Position { record, position, .. } => {
                 c.positions.iter().find(|p| p.record == *record && p.position == *position)
             }
             _ => None,
@@ -349,60 +349,64 @@ fn at_positions(c: &Calibration) -> String {
 }
 
 /// Action for one finding of a calibration.
-fn of_finding(c: &Calibration, f: &Finding) -> String {
+fn of_finding(c: &Calibration, f: &CalibrationFinding) -> String {
     match f {
-        Finding::Interrupted => "Run the same command again, to its end.".into(),
-        Finding::NotSettled => UNSETTLED.into(),
-        Finding::Clock { by_durations, by_durations_sigma, by_changes, by_earth, .. } => {
+        CalibrationFinding::Interrupted => "Run the same command again, to its end.".into(),
+        CalibrationFinding::NotSettled => UNSETTLED.into(),
+        CalibrationFinding::Clock { by_durations, by_durations_sigma, by_changes, by_earth, .. } => {
             let by_durations = durations(*by_durations, *by_durations_sigma);
             of_clock(by_durations.as_ref(), by_changes.as_ref(), by_earth.as_ref()).into()
         }
-        Finding::Cells { column, kind_of_cells, lines, .. } => of_cells(column, *kind_of_cells, *lines),
-        Finding::Succession { position, .. } => format!(
+        CalibrationFinding::Cells { column, kind_of_cells, lines, .. } => {
+            of_cells(column, *kind_of_cells, *lines)
+        }
+        CalibrationFinding::Succession { position, .. } => format!(
             "Look at the record around these lines: after a step of an output, run {position} again; where \
              the platform was disturbed, empty the cells of those rows."
         ),
-        Finding::ClockJump { line, by_s, .. } => format!(
+        CalibrationFinding::ClockJump { line, by_s, .. } => format!(
             "Subtract {by_s:.1} s from the times from line {line} on, and calibrate again. Let loggers run by UTC or \
              by a clock that nobody sets."
         ),
-        Finding::Copy { record, .. } => format!("Leave {record} out: it is a copy."),
-        Finding::Turns { .. } => "State the rate of the turns of this run, and calibrate again.".into(),
-        Finding::Force { .. } => {
+        CalibrationFinding::Copy { record, .. } => format!("Leave {record} out: it is a copy."),
+        CalibrationFinding::Turns { .. } => {
+            "State the rate of the turns of this run, and calibrate again.".into()
+        }
+        CalibrationFinding::Force { .. } => {
             "Add scales and zeros of the accelerometers to the unknowns (K1, K0), or state the \
              gravity of the place, for forces in m/s^2."
                 .into()
         }
-        Finding::Position { .. } => at_positions(c),
-        Finding::Noise { .. } | Finding::Channel { .. } => {
+        CalibrationFinding::Position { .. } => at_positions(c),
+        CalibrationFinding::Noise { .. } | CalibrationFinding::Channel { .. } => {
             "Estimate the noise from the record, or use the rescaled sigmas instead of those of the \
              assumed noise."
                 .into()
         }
-        Finding::Correlated { .. } => {
+        CalibrationFinding::Correlated { .. } => {
             "State noise with memory (random walk, bias instability), or add an unknown for what drifts: \
              sigmas of white noise are too small."
                 .into()
         }
-        Finding::Temperature { .. } => {
+        CalibrationFinding::Temperature { .. } => {
             "Repeat the run at a steady temperature: the residuals follow it.".into()
         }
-        Finding::Outliers { .. } => "Check the noise of the record: too many of its samples are \
+        CalibrationFinding::Outliers { .. } => "Check the noise of the record: too many of its samples are \
                                      far off."
             .into(),
-        Finding::Repeatability { .. } => {
+        CalibrationFinding::Repeatability { .. } => {
             "Calibrate each record alone: the coefficients changed between the runs, or sigmas are too small."
                 .into()
         }
-        Finding::SecondPath { .. } => {
+        CalibrationFinding::SecondPath { .. } => {
             "Do not use the estimates: two ways to compute them do not agree.".into()
         }
-        Finding::Suspect { errors, .. } => format!(
+        CalibrationFinding::Suspect { errors, .. } => format!(
             "Estimate the error that the residuals show, or repair the bench: {} ({}).",
             errors.join(" and "),
             omitted::estimated_by(errors)
         ),
-        Finding::Known { .. } => {
+        CalibrationFinding::Known { .. } => {
             "Calibrate without the earlier calibration: it does not agree with these records.".into()
         }
     }

@@ -14,7 +14,7 @@ const PRODUCTS: usize = 1200;
 const DEGREE: usize = 4;
 
 /// Jets with their powers.
-type Product = Vec<(Jet, u8)>;
+type JetProduct = Vec<(Jet, u8)>;
 
 /// Search for relations along the trajectory from the values `at` of the unknowns.
 struct TrajectorySearch<'s, 'a> {
@@ -23,7 +23,7 @@ struct TrajectorySearch<'s, 'a> {
     outputs: usize,
     found: Vec<Relation>,
     /// Product that each relation gives by others before it.
-    given: Vec<Product>,
+    given: Vec<JetProduct>,
 }
 
 /// Relations along the trajectory from the values `at` of the unknowns, sought in ever larger sets of
@@ -58,7 +58,8 @@ pub(super) fn relations_along(
 impl TrajectorySearch<'_, '_> {
     /// True if a relation gives the jet, or one of which it is a derivative.
     fn is_given(&self, jet: &Jet) -> bool {
-        let gives = |p: &Product| matches!(p[..], [(g, 1)] if g.index == jet.index && g.order <= jet.order);
+        let gives =
+            |p: &JetProduct| matches!(p[..], [(g, 1)] if g.index == jet.index && g.order <= jet.order);
         self.given.iter().any(gives)
     }
 

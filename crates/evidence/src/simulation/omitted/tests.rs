@@ -319,13 +319,13 @@ fn record_every(column: &Column, angles: &[[f64; 3]], carry: Carry, [dwell_s, st
 }
 
 /// Orthonormal basis of the columns, each scaled to length one, for least squares.
-struct Basis {
+struct OrthonormalBasis {
     q: Vec<DVector<f64>>,
     /// Columns in the basis by index, with their coefficients in `q` and their lengths.
     used: Vec<(usize, Vec<f64>, f64)>,
 }
 
-impl Basis {
+impl OrthonormalBasis {
     fn of(columns: &[DVector<f64>]) -> Self {
         let mut out = Self { q: Vec::new(), used: Vec::new() };
         for (c, column) in columns.iter().enumerate() {
@@ -417,7 +417,7 @@ fn largest_difference(schemes: usize, seed: u64) -> f64 {
         let dwell_s = 1000.0;
         let (attained, of) = effects(&scheme);
         let platform = &attained.plan.platform;
-        let basis = Basis::of(&unknowns(platform, &angles, dwell_s));
+        let basis = OrthonormalBasis::of(&unknowns(platform, &angles, dwell_s));
         for term in &of.terms {
             let z = record(&Column::Name(term.name.clone()), &angles, scheme.carry, dwell_s);
             let x = basis.solve(&DVector::from_vec(z), platform.names().len());
@@ -470,7 +470,7 @@ fn compared_classes(schemes: usize, seed: u64) -> [usize; 4] {
         let platform = Platform::new(scheme.clone()).expect("a platform");
         let model = OmittedModel::new(&platform);
         let verdicts = omitted_verdicts(&platform, &model, 1).expect("classes");
-        let basis = Basis::of(&unknowns(&platform, &angles, 20_000.0));
+        let basis = OrthonormalBasis::of(&unknowns(&platform, &angles, 20_000.0));
         for v in &verdicts.terms {
             let z = DVector::from_vec(record(&Column::Name(v.name.clone()), &angles, scheme.carry, 20_000.0));
             // an error of 1 in SI units; rounding of sines is no effect
