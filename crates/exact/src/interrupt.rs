@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(hearing(Duration::ZERO, inner, || count(50, &Rc::default())), Some(49));
     }
 
-    /// Where checks follow each other closely, one of sixteen reads the clock; where they do not, each does.
+    /// One of sixteen checks that follow each other closely reads the clock; otherwise each check does.
     #[test]
     fn the_clock_is_read_as_often_as_needed() {
         for (interval, least, most) in [(6000, 10, 10), (0, 160, 160)] {

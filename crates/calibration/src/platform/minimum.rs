@@ -85,7 +85,7 @@ impl PlatformProblem<'_> {
 
     /// Lowest of the minima about an estimate with curvature; others nearly as low are counted as rivals. A
     /// nonlinear sum of squares has several minima, and the first one found need not be the most probable.
-    /// Where the scheme leaves directions undetermined, a minimum without curvature may be far from the most
+    /// If the scheme leaves directions undetermined, a minimum without curvature may be far from the most
     /// probable one too, so minima are sought from the priors.
     ///
     /// # Errors

@@ -185,8 +185,8 @@ fn a_bench_counts_as_much_as_its_error_changes() {
     assert!(seen > 12, "{seen}");
 }
 
-/// Where labels leave the beginning of the scheme open, it may explain residuals too. An error of five times
-/// its visible size is still named, although a later beginning would explain most of it.
+/// A beginning of the scheme that labels leave open may explain residuals too. An error of five times its
+/// visible size is still named, although a later beginning would explain most of it.
 #[test]
 fn an_error_is_distinguished_from_an_open_beginning() {
     use crate::simulator::AtOnce;

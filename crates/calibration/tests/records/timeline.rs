@@ -96,7 +96,7 @@ fn the_timeline_of_the_scheme_stands() {
     }
 }
 
-/// Where nothing shows that rows are missing, a timeline late by less than an interval shows in the fit.
+/// A timeline late by less than an interval shows in the fit, if nothing else shows that rows are missing.
 #[test]
 fn a_beginning_shows_in_the_fit() {
     let bench = bench(8);

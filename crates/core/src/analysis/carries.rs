@@ -80,7 +80,7 @@ pub(super) fn carry_reports(
 }
 
 /// Verdicts of a scheme that is not under reset carry, with verdicts on psi of every position, `psi_x@2`.
-/// Where rotations are judged by their output history only the first position is included: psi after a
+/// If rotations are judged by their output history, only the first position is included: psi after a
 /// rotation is no combination of the unknowns with known numbers.
 fn with_psi_of_positions(platform: &Platform, judged: &Verdicts) -> NamedVerdicts {
     let (scheme, names) = (platform.scheme(), platform.names());

@@ -4,10 +4,10 @@
 //! A relation `sum_i c_i(theta) m_i(y, y', ..., u, u', ...) = 0` holds for every solution. If one trajectory
 //! determines its coefficients up to a factor, every ratio `c_i/c_j` is a function of the output. Ratios of
 //! low degree are interpolated; setting them to their values at the base point gives a system in the
-//! constants alone. A constant with one value among its solutions is unique, whatever other ratios are.
-//! Where amounts are conserved, one trajectory does not determine the coefficients of the relations that all
-//! have. Then relations are sought along one trajectory; their ratios are functions of the constants and of
-//! the start. Several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
+//! constants alone. A constant with one value among its solutions is unique, whatever other ratios are. If
+//! amounts are conserved, one trajectory does not determine the coefficients of the relations that all have.
+//! Then relations are sought along one trajectory; their ratios are functions of the constants and of the
+//! start. Several values from some ratios prove nothing (Ollivier 1990; Ljung, Glad 1994,
 //! doi:10.1016/0005-1098(94)90029-9; relations by evaluation instead of elimination).
 //!
 //! Constants that a symmetry changes keep their values: the solutions for all others are conjugate over
