@@ -128,7 +128,7 @@ fn written(asked: Option<PathBuf>, name: &str, engine: &PageEngine) -> Result<(P
         style_digest => digest(STYLE),
         script => &script,
         script_digest => digest(&script),
-        connect => engine.connect,
+        connect => &engine.connect,
         version => env!("CARGO_PKG_VERSION"),
         // without `<`, no text in the data ends the script element
         data => data.to_string().replace('<', "\\u003c"),
