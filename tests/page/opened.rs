@@ -25,10 +25,10 @@ struct Page {
 /// obsdeg-web`, minutes of compilation for another target), else a draft, whose engine is the program that
 /// writes it.
 fn page() -> Page {
-    // with the features of the whole workspace, so that nothing is compiled again
+    // with the features of the whole workspace and its tests (an example has them), so that nothing is compiled again
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let built = Command::new(cargo)
-        .args(["build", "-q", "--workspace", "--bin", "workbench"])
+        .args(["build", "-q", "--workspace", "--bin", "workbench", "--example", "verdicts"])
         .current_dir(root())
         .status();
     assert!(built.expect("cargo runs").success(), "the builder of the page is built");
