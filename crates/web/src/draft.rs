@@ -4,21 +4,43 @@
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::sync::mpsc::{Receiver, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
 use crate::engine;
+
+/// Time after which a command ends whose progress nobody took: its question was dropped.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Progress of a command that was sent and not yet taken.
+struct Untaken {
+    count: usize,
+    /// Time at which progress was last taken, or could first be.
+    since: Instant,
+}
+
+/// A command at work.
+struct Work {
+    /// Progress of the command, then its answer.
+    receiver: Receiver<Value>,
+    untaken: Arc<Mutex<Untaken>>,
+}
 
 /// Commands at work.
 #[derive(Default)]
 struct Works {
     /// Number of commands that were begun.
     begun: u64,
-    /// Progress of each, then its answer, by its number.
-    receivers: BTreeMap<u64, Receiver<Value>>,
+    /// Each by its number.
+    works: BTreeMap<u64, Work>,
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Answers the draft's questions until the standard input ends.
@@ -73,33 +95,43 @@ fn respond(mut stream: &TcpStream, works: &Mutex<Works>) -> io::Result<()> {
 
 /// Begins a command; returns its first progress, or its answer.
 fn begin(command: String, request: String, works: &Mutex<Works>) -> Value {
-    // progress that nobody takes, since the question was dropped, holds the command up
-    let (sender, receiver) = sync_channel(1);
-    let work = {
-        let mut works = works.lock().unwrap_or_else(PoisonError::into_inner);
+    let (sender, receiver) = channel();
+    let untaken = Arc::new(Mutex::new(Untaken { count: 0, since: Instant::now() }));
+    let number = {
+        let mut works = lock(works);
         works.begun += 1;
-        let work = works.begun;
-        works.receivers.insert(work, receiver);
-        work
+        let number = works.begun;
+        works.works.insert(number, Work { receiver, untaken: Arc::clone(&untaken) });
+        number
     };
     thread::spawn(move || {
+        let sender = Mutex::new(sender);
         let out = engine::call(&command, &request, &|now| {
-            sender.send(json!({ "work": work, "going": now })).is_ok()
+            let mut untaken = lock(&untaken);
+            if untaken.count == 0 {
+                untaken.since = Instant::now();
+            }
+            untaken.count += 1;
+            untaken.since.elapsed() < PATIENCE
+                && lock(&sender).send(json!({ "work": number, "going": now })).is_ok()
         });
-        sender.send(json!({ "work": work, "out": out }))
+        lock(&sender).send(json!({ "work": number, "out": out }))
     });
-    next(work, works)
+    next(number, works)
 }
 
-/// Next progress of a command, or its answer, which ends it.
-fn next(work: u64, works: &Mutex<Works>) -> Value {
-    let lock = || works.lock().unwrap_or_else(PoisonError::into_inner);
-    let taken = lock().receivers.remove(&work);
-    let ended = json!({ "work": work, "out": "" });
-    let Some(receiver) = taken else { return ended };
-    let said = receiver.recv().unwrap_or(ended);
+/// Latest progress of a command, or its answer, which ends it; waits for the next where all was taken.
+fn next(number: u64, works: &Mutex<Works>) -> Value {
+    let taken = lock(works).works.remove(&number);
+    let ended = json!({ "work": number, "out": "" });
+    let Some(work) = taken else { return ended };
+    let first = work.receiver.recv().unwrap_or(ended);
+    let mut untaken = lock(&work.untaken);
+    let said = work.receiver.try_iter().last().unwrap_or(first);
+    *untaken = Untaken { count: 0, since: Instant::now() };
+    drop(untaken);
     if said.get("going").is_some() {
-        lock().receivers.insert(work, receiver);
+        lock(works).works.insert(number, work);
     }
     said
 }
