@@ -9,7 +9,7 @@ use super::dag::{Dag, Op};
 use super::fibre::{CountingPoint, Fibre, at_point};
 use super::function_factors::ModelFactors;
 use super::global::{self, ModelRelations, RelationConsequences};
-use super::judge::Judgement;
+use super::judge::verdicts::Judgement;
 use super::maps::second_solution;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::quotients::QuotientTerms;

@@ -5,7 +5,8 @@ use std::collections::HashSet;
 
 use super::answer::{Analyzed, NumberOfSolutions, SystemAnalysis, SystemOptions, SystemQuantity, analyzed};
 use super::error::ModelError;
-use super::judge::{Judgement, judge};
+use super::judge::judge;
+use super::judge::verdicts::Judgement;
 use super::model::{
     Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StartTime, StateStart, SystemModel,
 };

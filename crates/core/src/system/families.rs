@@ -1,7 +1,7 @@
 //! Products of powers among which identifiable functions are sought.
 
 use super::function_factors::ModelFactors;
-use super::judge::Judgement;
+use super::judge::verdicts::Judgement;
 use super::model::Role;
 use super::quotients::QuotientPowers;
 use super::symmetry::{Symmetries, integers};

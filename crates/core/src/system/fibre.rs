@@ -26,7 +26,7 @@ use obsdeg_exact::{Field, SplitMix64, polynomial};
 use super::dag::Op;
 use super::function_factors::ModelFactors;
 use super::global::RelationConsequences;
-use super::judge::Judgement;
+use super::judge::verdicts::Judgement;
 use super::model::{Compiled, Role, SystemModel};
 use super::quotients::{QuotientTerms, Quotients};
 use super::rows::{Layout, SystemRows, Unknown};

@@ -8,7 +8,7 @@ use obsdeg_exact::{Field, Scalars};
 
 use super::dag::Op;
 use super::function_factors::ModelFactors;
-use super::judge::Judgement;
+use super::judge::verdicts::Judgement;
 use super::model::{Compiled, KnownInput, Role, SystemModel};
 use super::quotients::{QuotientPowers, QuotientTerms};
 use super::rows::Unknown;

@@ -65,7 +65,8 @@ pub use constraints::ConstraintFactor;
 pub use dag::{Dag, DagError, Op};
 pub use error::ModelError;
 pub use gathered::{Gathered, OutputRows, gather};
-pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
+pub use judge::verdicts::{ByDigits, Judgement, SystemCertainty};
+pub use judge::{judge, judge_compiled, judge_in_digits};
 pub use model::{
     AlgebraicEquation, Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, ExperimentChanges,
     FilePlace, KnownInput, ModelSegment, Named, Nominal, PlacedExpression, Role, StartTime, State,

@@ -13,7 +13,8 @@ use obsdeg_exact::Echelon;
 
 use super::error::ModelError;
 use super::identifiable::{identifiable_functions, terms_of};
-use super::judge::{Judgement, judge, judge_compiled};
+use super::judge::verdicts::Judgement;
+use super::judge::{judge, judge_compiled};
 use super::model::{
     Constant, KnownInput, Named, PlacedExpression, Role, StartTime, State, StateStart, SystemModel,
 };

@@ -4,7 +4,9 @@ use std::cmp::Reverse;
 
 use obsdeg_exact::Reals;
 
-use super::judge::{Judgement, climb_at, judge_beside};
+use super::judge::judge_beside;
+use super::judge::point_degrees::climb_at;
+use super::judge::verdicts::Judgement;
 use super::model::{
     Compiled, Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StateStart, SystemModel,
 };

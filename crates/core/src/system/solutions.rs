@@ -17,7 +17,7 @@ use super::dag::Op;
 use super::elimination::{EliminationSystem, eliminate};
 use super::fibre::reached;
 use super::formula;
-use super::judge::Judgement;
+use super::judge::verdicts::Judgement;
 use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
 use super::rows::SystemRows;
 use super::values::Values;

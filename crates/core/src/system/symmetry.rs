@@ -5,7 +5,8 @@ use obsdeg_exact::{Reals, RowSpace, SplitMix64};
 
 use super::error::ModelError;
 use super::functions::gcd;
-use super::judge::{Judgement, PointDegrees, climb_at};
+use super::judge::point_degrees::{PointDegrees, climb_at};
+use super::judge::verdicts::Judgement;
 use super::model::{Compiled, Role, SystemModel};
 use super::values::Values;
 use super::work::{Spent, WorkLimit, product};

@@ -22,7 +22,7 @@ use obsdeg_exact::groebner::{GroebnerBasis, OverLimit, RemainingWork};
 use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
-use super::judge::Judgement;
+use super::judge::verdicts::Judgement;
 use super::model::{Compiled, StateStart, SystemModel};
 use integrals::relations_along;
 use jets::JetSource;
