@@ -15,7 +15,7 @@ use super::judge::verdicts::{ByDigits, Judgement, SystemCertainty};
 use super::model::{Compiled, Role, StartTime, StateStart, SystemModel};
 use super::quotients::QuotientTerms;
 use super::remedies::remedies;
-use super::rows::Unknown;
+use super::rows::layout::Unknown;
 use super::solutions::solutions;
 use super::symmetry::{Invariant, PolynomialDirection, PolynomialTerm, Symmetries, Symmetry, symmetries};
 use crate::degree::status::{Status, Verdict};

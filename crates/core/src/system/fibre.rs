@@ -29,7 +29,8 @@ use super::global::RelationConsequences;
 use super::judge::verdicts::Judgement;
 use super::model::{Compiled, Role, SystemModel};
 use super::quotients::{QuotientTerms, Quotients};
-use super::rows::{Layout, SystemRows, Unknown};
+use super::rows::SystemRows;
+use super::rows::layout::{Layout, Unknown};
 use super::undecided::{LONGEST, NotCounted};
 use super::work;
 

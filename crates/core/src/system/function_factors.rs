@@ -4,7 +4,7 @@ use obsdeg_exact::Field;
 
 use super::dag::Op;
 use super::model::{Compiled, KnownInput, Role, SystemModel};
-use super::rows::Layout;
+use super::rows::layout::Layout;
 use crate::language::Function;
 
 /// Function of one unknown, as the sine of an angle.

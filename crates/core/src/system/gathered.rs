@@ -10,7 +10,8 @@ use super::judge::point_degrees::{refuse, singular};
 use super::judge::verdicts::{Judgement, SystemCertainty};
 use super::judge::{FieldChoice, judge_compiled};
 use super::model::{Compiled, SystemModel};
-use super::rows::{Layout, PointRows, SystemRows};
+use super::rows::layout::Layout;
+use super::rows::{PointRows, SystemRows};
 use super::values::Values;
 use super::work::{Spent, Work};
 

@@ -7,7 +7,8 @@ use obsdeg_exact::{RowSpace, SplitMix64};
 
 use super::constraints::slots_of;
 use super::model::{Role, StateStart};
-use super::rows::{Point, PointBuilder, Rows, dense};
+use super::rows::point::{Point, PointBuilder};
+use super::rows::run::{Rows, dense};
 use super::taylor::{Signal, Singular, Taylor};
 use super::values::Values;
 use super::work::{WorkStep, product};

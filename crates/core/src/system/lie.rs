@@ -11,7 +11,7 @@ use super::function_factors::ModelFactors;
 use super::judge::verdicts::Judgement;
 use super::model::{Compiled, KnownInput, Role, SystemModel};
 use super::quotients::{QuotientPowers, QuotientTerms};
-use super::rows::Unknown;
+use super::rows::layout::Unknown;
 use super::values::Values;
 
 /// Largest number of terms of a polynomial that is formed, and of a function that is returned.

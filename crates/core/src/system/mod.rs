@@ -73,7 +73,8 @@ pub use model::{
     StateStart, SystemModel,
 };
 pub use reduced::{Reduced, ReducedError, reduced};
-pub use rows::{Layout, OwnRows, PointRows, Unknown};
+pub use rows::layout::{Layout, Unknown};
+pub use rows::{OwnRows, PointRows};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
 pub use why::explain_system;
 pub use work::WorkLimit;

@@ -12,7 +12,7 @@ use obsdeg_exact::{Field, SplitMix64};
 use super::constraints::below;
 use super::dag::{Dag, Op};
 use super::model::{Compiled, Role};
-use super::rows::{Layout, Unknown};
+use super::rows::layout::{Layout, Unknown};
 use super::values::Values;
 
 /// Largest number of slots of unknowns among which exchanges of two and of three pairs are tried.

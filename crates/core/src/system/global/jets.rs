@@ -6,7 +6,7 @@ use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::super::dag::Op;
 use super::super::model::{Compiled, KnownInput, Role, SystemModel};
-use super::super::rows::Layout;
+use super::super::rows::layout::Layout;
 use super::super::taylor::{Initial, Signal, Taylor};
 use super::super::work;
 

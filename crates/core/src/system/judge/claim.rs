@@ -4,7 +4,7 @@ use obsdeg_exact::certainty::RankClaim;
 
 use super::super::dag::{Dag, Op};
 use super::super::model::{Compiled, Role};
-use super::super::rows::Layout;
+use super::super::rows::layout::Layout;
 use crate::degree::filtration::Degrees;
 use crate::language::Function;
 

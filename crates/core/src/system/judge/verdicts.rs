@@ -4,7 +4,7 @@ use obsdeg_exact::{Echelon, Field, RowSpace};
 
 use super::super::branches::BranchSide;
 use super::super::model::{Role, SystemModel};
-use super::super::rows::{Layout, Unknown};
+use super::super::rows::layout::{Layout, Unknown};
 use super::super::values::Values;
 use super::point_degrees::PointDegrees;
 use crate::degree::findings::{ByPrimes, Findings};

@@ -7,7 +7,8 @@ use super::super::model::Role;
 use super::super::taylor::{Signal, Singular, Taylor};
 use super::super::values::Values;
 use super::super::work::{WorkStep, product};
-use super::{Point, PointBuilder, Rows, cost_of, rows_of};
+use super::point::{Point, PointBuilder};
+use super::run::{Rows, cost_of, rows_of};
 
 /// Spans of the rows of a run at a generic point, one per group of outputs.
 struct GenericSpans<S: Values> {
