@@ -8,7 +8,7 @@ use obsdeg_design::review::{ModelReview, SchemeReview};
 use obsdeg_evidence::compare::ComparedScheme;
 use obsdeg_evidence::requirements::Miss;
 
-use super::fewest_of_all;
+use super::sensitivity::fewest_of_all;
 use crate::calibration_findings::{durations, is_clock};
 use crate::document::number;
 use crate::simulation::NOT_TRUSTED;

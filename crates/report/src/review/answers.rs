@@ -89,8 +89,12 @@ fn assumed(s: &SchemeReview, review: &ComparedScheme) -> String {
     let dwells = || s.positions.iter().map(|p| p.dwell_s);
     let (least, most) = dwells().fold((f64::MAX, f64::MIN), |(l, h), t| (l.min(t), h.max(t)));
     let dwell = match least == most {
-        true => format!("dwell {} s per position", super::seconds(most)),
-        false => format!("dwell {} to {} s per position", super::seconds(least), super::seconds(most)),
+        true => format!("dwell {} s per position", super::sections::seconds(most)),
+        false => format!(
+            "dwell {} to {} s per position",
+            super::sections::seconds(least),
+            super::sections::seconds(most)
+        ),
     };
     let mut out = vec![
         format!("noise of Z {:e} g per sample and axis{azimuth}", m.accelerometer_noise_g),
@@ -186,10 +190,18 @@ fn duration(s: &SchemeReview, review: &ComparedScheme) -> String {
     let dwells: f64 = s.positions.iter().map(|p| p.dwell_s).sum();
     let n = s.positions.len();
     let turns = match slews > 0.0 {
-        true => format!("; {} s at rest, {} s of turns", super::seconds(dwells), super::seconds(slews)),
+        true => format!(
+            "; {} s at rest, {} s of turns",
+            super::sections::seconds(dwells),
+            super::sections::seconds(slews)
+        ),
         false => "; turns count as instantaneous".into(),
     };
-    format!("{}, {n} position{}{turns}", super::duration(review.total_s), if n == 1 { "" } else { "s" })
+    format!(
+        "{}, {n} position{}{turns}",
+        super::sections::duration(review.total_s),
+        if n == 1 { "" } else { "s" }
+    )
 }
 
 /// Certainty of the exact verdicts, and the figures that no proof covers.

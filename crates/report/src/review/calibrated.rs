@@ -88,7 +88,7 @@ pub(crate) fn pictures(c: &Calibration, id: &str) -> Pictures {
 pub(crate) fn answers(name: &str, c: &Calibration) -> Answers {
     let of = |r: &RecordReport| {
         let (from, to) = r.span_s;
-        format!("{}: {}, {} samples", file_name(&r.name), super::duration(to - from), r.samples)
+        format!("{}: {}, {} samples", file_name(&r.name), super::sections::duration(to - from), r.samples)
     };
     Answers {
         name: name.into(),

@@ -4,7 +4,8 @@ use obsdeg_core::degree::Status;
 use obsdeg_design::review::GenericReview;
 
 use super::answers::Answers;
-use super::{derivatives, pictures, section};
+use super::pictures;
+use super::sections::{derivatives, section};
 use crate::document::{DocumentBlock, Grade, StatusBox, StatusRow, TableCell};
 use crate::{Answer, words};
 

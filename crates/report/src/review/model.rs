@@ -7,7 +7,9 @@ use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
 use super::answers::{self, Answers};
-use super::{ERRORS, derivatives, is_list, pictures, section};
+use super::evidence::ERRORS;
+use super::pictures;
+use super::sections::{derivatives, is_list, section};
 use crate::document::{DocumentBlock, Grade, StatusBox, StatusRow, TableCell, number};
 use crate::{Answer, stated, system, words};
 

@@ -5,7 +5,7 @@ use obsdeg_design::review::SchemeReview;
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
-use super::{derivatives, duration, joined};
+use super::sections::{derivatives, duration, joined};
 use crate::document::{Grade, StatusBox, StatusRow, number};
 use crate::{gimbals, omitted, stated, words};
 
