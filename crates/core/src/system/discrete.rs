@@ -3,7 +3,8 @@
 
 use std::collections::HashSet;
 
-use super::answer::{Analyzed, NumberOfSolutions, SystemAnalysis, SystemOptions, SystemQuantity, analyzed};
+use super::answer::data::{NumberOfSolutions, SystemAnalysis, SystemOptions, SystemQuantity};
+use super::answer::{Analyzed, analyzed};
 use super::error::ModelError;
 use super::judge::judge;
 use super::judge::verdicts::Judgement;

@@ -58,7 +58,8 @@ mod why;
 pub(crate) mod work;
 
 pub use analyze::analyze_system;
-pub use answer::*;
+pub use answer::data::*;
+pub use answer::texts::{invariant_reports, symmetry_reports};
 pub use branches::BranchSide;
 pub use candidates::{CANDIDATE_WORDS, check_cost};
 pub use constraints::ConstraintFactor;

@@ -2,7 +2,7 @@
 
 use obsdeg_exact::{RowSpace, Scalars};
 
-use super::answer::{SystemAnalysis, SystemOptions};
+use super::answer::data::{SystemAnalysis, SystemOptions};
 use super::error::ModelError;
 use super::gathered::{RunOutputRows, gather_runs};
 use super::judge::verdicts::Judgement;
