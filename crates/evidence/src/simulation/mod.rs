@@ -43,7 +43,8 @@ pub use conditions::{
 pub use consistency::{Consistency, Doubt};
 pub use datasheet::GyroNoise;
 pub use error::SimulationError;
-pub use extended::{ExtendedFilter, FilterResult, PlatformMotion, Tilt};
+pub use extended::motion::{PlatformMotion, Tilt};
+pub use extended::{ExtendedFilter, FilterResult};
 pub use floor::{CoefficientFloor, NoiseFloor, Reached, noise_floor, sigmas_without_prior};
 pub use iterated::iterated;
 pub use known::KnownCovariance;
