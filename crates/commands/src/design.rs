@@ -12,7 +12,6 @@ use obsdeg_design::design::{
 use obsdeg_design::next::{NextOptions, NextPositions};
 use obsdeg_design::sensors::Sensors;
 use obsdeg_evidence::simulation::Conditions;
-use serde::{Deserialize, Serialize};
 
 use crate::arguments::check_whole;
 use crate::designed::{Designed, Searched, SearchedSlewSequence};
@@ -23,24 +22,7 @@ use crate::problem::Problem;
 use crate::source::Source;
 use asked::{Asked, known, proof, read_part, stated};
 use checks::{check_values, idle};
-use options::{KEPT, Search};
-
-/// Files of a search.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct SearchFiles {
-    /// Scheme whose conditions hold. Its positions are no candidates; their number is the number of positions
-    /// by default.
-    pub conditions_file: Option<Source>,
-    /// Scheme whose positions are the candidates.
-    pub candidates_file: Option<Source>,
-    /// Parts to merge.
-    pub merge: Vec<Source>,
-    /// Interrupted part that is continued.
-    pub resume: Option<Source>,
-    /// The calibration after which further positions are sought.
-    pub after: Option<Source>,
-}
+use options::{CARDINAL, KEPT, Search, SearchFiles};
 
 /// Searches schemes, or sets of outputs of a model.
 ///
@@ -238,9 +220,6 @@ fn fewest_positions_of_slew_sequence(
         shortest_slew_sequence(&base, &options, &|| (host.progress)(Now::of("searching walks", 0, 1)))?;
     Ok(Designed::SlewSequence(Box::new(SearchedSlewSequence { found, base })))
 }
-
-/// Default of `--candidates`.
-const CARDINAL: &str = "cardinal";
 
 /// Candidates, and the scheme whose assumptions hold.
 fn candidates(text: &str, file: Option<&Source>) -> Result<(Scheme, Candidates), Problem> {

@@ -7,8 +7,7 @@ use obsdeg_report::File;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::SearchFiles;
-use super::options::Search;
+use super::options::{Search, SearchFiles};
 use crate::problem::Problem;
 use crate::source::Source;
 

@@ -9,12 +9,12 @@ use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
 use obsdeg_design::design::{CriterionName, Immune};
 use serde::{Deserialize, Serialize};
 
-use super::CARDINAL;
 use crate::arguments::{ANY, Assumptions, SEED, TermOptions, Word, WordOr, one_of, whole};
 use crate::conditions::{MeasurementOptions, within};
 use crate::measure::MeasureOptions;
 use crate::next::FurtherOptions;
 use crate::problem::Problem;
+use crate::source::Source;
 use crate::text;
 
 /// Range of the number of positions.
@@ -28,6 +28,9 @@ pub(super) const CHECKED: RangeInclusive<u64> = 0..=1_000_000_000;
 
 /// Range of the number of restarts of the exchange.
 pub(super) const RESTARTS: RangeInclusive<u64> = 1..=1_000_000;
+
+/// Default of `--candidates`.
+pub(super) const CARDINAL: &str = "cardinal";
 
 /// Words of `--candidates`; any other text is the path of a file.
 const CANDIDATES: [(&str, &str); 3] = [
@@ -297,4 +300,21 @@ fn part(text: &str) -> Result<[usize; 2], String> {
 fn percent(text: &str) -> Result<f64, String> {
     let found = text.trim().parse().ok().filter(|x: &f64| (0.0..=100.0).contains(x));
     found.ok_or_else(|| format!("expected 0 to 100 percent, found `{text}`"))
+}
+
+/// Files of a search.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SearchFiles {
+    /// Scheme whose conditions hold. Its positions are no candidates; their number is the number of positions
+    /// by default.
+    pub conditions_file: Option<Source>,
+    /// Scheme whose positions are the candidates.
+    pub candidates_file: Option<Source>,
+    /// Parts to merge.
+    pub merge: Vec<Source>,
+    /// Interrupted part that is continued.
+    pub resume: Option<Source>,
+    /// The calibration after which further positions are sought.
+    pub after: Option<Source>,
 }
