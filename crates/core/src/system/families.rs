@@ -2,7 +2,7 @@
 
 use super::function_factors::ModelFactors;
 use super::judge::verdicts::Judgement;
-use super::model::Role;
+use super::model::compiled::Role;
 use super::quotients::QuotientPowers;
 use super::symmetry::{Symmetries, integers};
 

@@ -3,7 +3,8 @@
 use obsdeg_exact::Field;
 
 use super::dag::Op;
-use super::model::{Compiled, KnownInput, Role, SystemModel};
+use super::model::compiled::{Compiled, Role};
+use super::model::{KnownInput, SystemModel};
 use super::rows::layout::Layout;
 use crate::language::Function;
 

@@ -22,7 +22,8 @@ use obsdeg_exact::{Echelon, Field, Reals, SplitMix64};
 
 use super::constraints::slots_of;
 use super::dag::Op;
-use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
+use super::model::compiled::{Compiled, Role};
+use super::model::{KnownInput, StateStart, SystemModel};
 use super::rows::layout::Layout;
 use super::rows::point::{PointBuilder, random_field};
 use super::taylor::{Signal, Taylor};

@@ -64,14 +64,15 @@ pub use branches::BranchSide;
 pub use candidates::{CANDIDATE_WORDS, check_cost};
 pub use constraints::ConstraintFactor;
 pub use dag::{Dag, DagError, Op};
+pub use error::FilePlace;
 pub use error::ModelError;
 pub use gathered::{Gathered, OutputRows, gather};
 pub use judge::verdicts::{ByDigits, Judgement, SystemCertainty};
 pub use judge::{judge, judge_compiled, judge_in_digits};
+pub use model::compiled::{Compiled, CompiledExperiment, CompiledSegment, Role};
 pub use model::{
-    AlgebraicEquation, Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, ExperimentChanges,
-    FilePlace, KnownInput, ModelSegment, Named, Nominal, PlacedExpression, Role, StartTime, State,
-    StateStart, SystemModel,
+    AlgebraicEquation, Candidate, Constant, ExperimentChanges, KnownInput, ModelSegment, Named, Nominal,
+    PlacedExpression, StartTime, State, StateStart, SystemModel,
 };
 pub use reduced::{Reduced, ReducedError, reduced};
 pub use rows::layout::{Layout, Unknown};

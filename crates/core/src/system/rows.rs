@@ -9,7 +9,8 @@ pub(crate) mod run;
 use obsdeg_exact::{RankMargin, RowSpace, SplitMix64};
 
 use super::branches::{Signs, sided};
-use super::model::{Compiled, CompiledSegment, StartTime, SystemModel};
+use super::model::compiled::{Compiled, CompiledSegment};
+use super::model::{StartTime, SystemModel};
 use super::taylor::Singular;
 use super::values::Values;
 use super::work::{Work, WorkStep, product};

@@ -23,7 +23,8 @@ use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
 use super::judge::verdicts::Judgement;
-use super::model::{Compiled, StateStart, SystemModel};
+use super::model::compiled::Compiled;
+use super::model::{StateStart, SystemModel};
 use integrals::relations_along;
 use jets::JetSource;
 use ratios::{CoefficientRatio, Pool, ratios};

@@ -3,7 +3,7 @@
 use obsdeg_exact::certainty::RankClaim;
 
 use super::super::dag::{Dag, Op};
-use super::super::model::{Compiled, Role};
+use super::super::model::compiled::{Compiled, Role};
 use super::super::rows::layout::Layout;
 use crate::degree::filtration::Degrees;
 use crate::language::Function;

@@ -3,7 +3,8 @@
 use obsdeg_exact::{Echelon, Field, RowSpace};
 
 use super::super::branches::BranchSide;
-use super::super::model::{Role, SystemModel};
+use super::super::model::SystemModel;
+use super::super::model::compiled::Role;
 use super::super::rows::layout::{Layout, Unknown};
 use super::super::values::Values;
 use super::point_degrees::PointDegrees;

@@ -7,7 +7,8 @@
 
 use obsdeg_exact::{RankMargin, RowSpace, Scalars, SplitMix64};
 
-use super::super::model::{Compiled, SystemModel};
+use super::super::model::SystemModel;
+use super::super::model::compiled::Compiled;
 use super::super::taylor::Singular;
 use super::super::values::Values;
 use super::super::work::{Work, WorkStep, product};

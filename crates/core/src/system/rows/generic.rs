@@ -3,7 +3,7 @@
 use obsdeg_exact::{RankMargin, RowSpace, SplitMix64};
 
 use super::super::adjoint::Adjoint;
-use super::super::model::Role;
+use super::super::model::compiled::Role;
 use super::super::taylor::{Signal, Singular, Taylor};
 use super::super::values::Values;
 use super::super::work::{WorkStep, product};

@@ -3,7 +3,8 @@
 use obsdeg_exact::Scalars;
 
 use super::super::branches::Signs;
-use super::super::model::{Compiled, Role, StateStart, SystemModel};
+use super::super::model::compiled::{Compiled, Role};
+use super::super::model::{StateStart, SystemModel};
 
 /// Smallest number of orders that are followed if no end is proven.
 const ORDERS: usize = 60;

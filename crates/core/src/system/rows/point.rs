@@ -4,7 +4,8 @@ use obsdeg_exact::prime::is_prime;
 use obsdeg_exact::{Field, RankMargin, RowSpace, SplitMix64};
 
 use super::super::adjoint::Adjoint;
-use super::super::model::{Compiled, CompiledSegment, KnownInput, Role, StartTime, StateStart, SystemModel};
+use super::super::model::compiled::{Compiled, CompiledSegment, Role};
+use super::super::model::{KnownInput, StartTime, StateStart, SystemModel};
 use super::super::taylor::{Initial, Signal, Singular, Taylor};
 use super::super::values::Values;
 use super::super::work::{Work, WorkStep};
