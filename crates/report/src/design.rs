@@ -117,7 +117,7 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
     );
     let azimuth = c.azimuth_noise_deg.map_or_else(String::new, |a| format!(", azimuth {a:e} deg per sample"));
     let bias = c.accelerometer_bias.as_ref();
-    let bias = bias.map_or_else(String::new, |b| format!(", {}, counted", words::accelerometer_bias(b)));
+    let bias = bias.map_or_else(String::new, |b| format!(", {}, counted", words::run::accelerometer_bias(b)));
     let none = |what: &Option<String>| what.clone().unwrap_or_else(|| "none".into());
     vec![
         format!(
@@ -139,7 +139,7 @@ fn conditions(d: &Design, s: &SearchReport) -> Vec<String> {
         format!(
             "estimated together: psi and all coefficients of the terms {}; {}",
             d.terms,
-            words::gyros(&d.geometry)
+            words::assumptions::gyros(&d.geometry)
         ),
     ]
 }
@@ -198,7 +198,9 @@ impl Answer for Design {
             vec![format!("{} carry, latitude {} deg{by}; seed {}", self.carry, self.latitude_deg, self.seed)];
         match &self.search {
             Some(s) => assumed.extend(conditions(self, s)),
-            None => assumed.push(format!("terms {}; {}", self.terms, words::gyros(&self.geometry))),
+            None => {
+                assumed.push(format!("terms {}; {}", self.terms, words::assumptions::gyros(&self.geometry)))
+            }
         }
         assumed.push(format!("required: {}", self.required.join(", ")));
         assumed.push(candidates(&self.candidates));

@@ -290,13 +290,13 @@ fn appendix(
     let a = &s.analysis;
     let mut indistinguishable = Vec::new();
     null_space(&mut indistinguishable, a);
-    let mut assumed = words::assumptions(a);
+    let mut assumed = words::assumptions::assumptions(a);
     // carry, latitude and observation are stated above
     assumed
         .extend(stated::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
     assumed.push(words::certainty(a));
-    let evidence = s.evidence.as_ref().err().map(words::no_evidence);
+    let evidence = s.evidence.as_ref().err().map(words::run::no_evidence);
     let alternatives = s.alternatives.refused.iter().map(|e| format!("no alternatives: {e}"));
     let notes = alike(&a.notes).into_iter().chain(evidence).chain(alternatives);
     assumed.extend(notes.map(|n| format!("note: {n}")));

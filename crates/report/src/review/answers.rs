@@ -67,7 +67,7 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme, certified: bo
     Answers {
         name: s.name.clone(),
         rows: vec![
-            ("Carry", words::carry(s.analysis.carry).into()),
+            ("Carry", words::assumptions::carry(s.analysis.carry).into()),
             ("Assumed", assumed(s, review).into()),
             ("Chosen by the program", chosen(s, review).into()),
             ("What limits it", limits(s, review)),
@@ -102,19 +102,18 @@ fn assumed(s: &SchemeReview, review: &ComparedScheme) -> String {
         dwell,
         format!("latitude {} deg", m.latitude_deg),
     ];
-    out.extend(m.settle_s.map(words::settle));
+    out.extend(m.settle_s.map(words::run::settle));
     out.extend(m.slew_rate_deg_s.map(|r| format!("turns at {r} deg/s, without samples")));
-    out.extend(m.accelerometer_bias.as_ref().map(words::accelerometer_bias));
+    out.extend(m.accelerometer_bias.as_ref().map(words::run::accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
-    out.extend(m.gyro_noise.as_ref().map(words::gyro_noise));
+    out.extend(m.gyro_noise.as_ref().map(words::run::gyro_noise));
     out.push(
         m.prior.as_ref().map_or_else(|| "no prior".into(), |p| format!("prior {p} (units of the file)")),
     );
-    out.push(
-        m.bench
-            .as_deref()
-            .map_or_else(|| "no bench (errors outside the model count as zero)".into(), words::bench),
-    );
+    out.push(m.bench.as_deref().map_or_else(
+        || "no bench (errors outside the model count as zero)".into(),
+        words::assumptions::bench,
+    ));
     out.join("; ")
 }
 

@@ -93,11 +93,11 @@ pub(crate) fn answers(name: &str, c: &Calibration) -> Answers {
     Answers {
         name: name.into(),
         rows: vec![
-            ("Carry", words::carry(c.setup.carry).into()),
+            ("Carry", words::assumptions::carry(c.setup.carry).into()),
             ("Assumed", assumed_in_brief(c).into()),
             ("Chosen by the program", chosen(c).into()),
             ("What limits it", limits(c)),
-            ("Accelerometers off by 20 ug", omitted::accelerometers_off_in_record(c).into()),
+            ("Accelerometers off by 20 ug", omitted::calibration::accelerometers_off_in_record(c).into()),
             ("Duration", c.records.iter().map(of).collect::<Vec<_>>().join("; ").into()),
             ("Position to drop", position_to_drop(c).into()),
             ("Proven by", PROVEN.into()),

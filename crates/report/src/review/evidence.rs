@@ -18,7 +18,7 @@ const SLOPES: usize = 4;
 pub(super) fn evidence_of(s: &SchemeReview, id: &str) -> Vec<DocumentBlock> {
     let c = match &s.evidence {
         Ok(c) => c,
-        Err(e) => return vec![DocumentBlock::Text(format!("None: {}.", words::no_evidence(e)))],
+        Err(e) => return vec![DocumentBlock::Text(format!("None: {}.", words::run::no_evidence(e)))],
     };
     let outcome = match (c.passed, c.verdicts_agree) {
         (true, _) if c.counts.not_resolvable > 0 => "agree in every check that is resolvable",

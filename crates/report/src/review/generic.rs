@@ -72,7 +72,7 @@ pub(super) fn answers(g: &GenericReview) -> Answers {
     Answers {
         name: g.name.clone(),
         rows: vec![
-            ("Carry", words::carry(a.carry).into()),
+            ("Carry", words::assumptions::carry(a.carry).into()),
             ("Assumed", format!("Almost {} at {} positions; {latitude}", any(g), a.positions.len()).into()),
             ("Chosen by the program", "Nothing".into()),
             ("What limits it", limits),

@@ -89,7 +89,7 @@ fn credible(m: &ModelReview) -> (Grade, String) {
     match m.run.as_ref().map(|r| &r.0.consistency) {
         None => (Grade::Open, "not run".into()),
         Some(c) if c.consistent => (Grade::Good, "consistent with its truth".into()),
-        Some(c) => (Grade::Limited, format!("NOT consistent with its truth: {}", words::doubts(c))),
+        Some(c) => (Grade::Limited, format!("NOT consistent with its truth: {}", words::run::doubts(c))),
     }
 }
 

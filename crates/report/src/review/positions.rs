@@ -12,7 +12,7 @@ pub(super) fn positions(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, id: &
     let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
         vec![
             p.name.clone(),
-            words::angles(p),
+            words::assumptions::angles(p),
             p.attitude.clone().unwrap_or_else(|| "-".into()),
             seconds(numbers.start_s),
             seconds(numbers.dwell_s),

@@ -28,7 +28,10 @@ pub(super) fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -
         [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")],
         review.sensitivity.iter().map(row),
     )];
-    out.extend(DocumentBlock::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
+    out.extend(DocumentBlock::list_if_any(
+        "Verdicts under the other carries",
+        words::assumptions::carries(&s.analysis),
+    ));
     out.extend(pictures::latitudes(s, &format!("{id}_latitude")));
     out
 }

@@ -126,8 +126,10 @@ pub(super) fn null_space(blocks: &mut Vec<DocumentBlock>, a: &Analysis) {
             latex: format!("{}\\quad\\text{{{verdict}}}", latex::expression(&c.expression)),
         }
     };
-    blocks
-        .extend(DocumentBlock::formulas("Observable combinations", words::combinations(a).map(combination)));
+    blocks.extend(DocumentBlock::formulas(
+        "Observable combinations",
+        words::assumptions::combinations(a).map(combination),
+    ));
 }
 
 /// Length in bytes from which a formula is one of many terms or decimals.
@@ -142,7 +144,7 @@ pub(super) fn solved(a: &Analysis) -> Vec<DocumentBlock> {
         let solution = q.solution.as_ref()?;
         Some(formula(latex::symbol(&q.name), &q.name, solution))
     });
-    let combinations = words::combinations(a).filter_map(|c| {
+    let combinations = words::assumptions::combinations(a).filter_map(|c| {
         let solution = c.solution.as_ref()?;
         Some(formula(latex::expression(&c.expression), &c.expression, solution))
     });
