@@ -43,7 +43,8 @@ pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_allan, call_cali
 pub use compare::{Compare, compare};
 pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions, RequirementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};
-pub use design::{DegreeCap, Search, SearchFiles, WantedOptions, design, is_word};
+pub use design::options::{DegreeCap, Search, SearchFiles, WantedOptions};
+pub use design::{design, is_word};
 pub use designed::{Designed, Searched, SearchedSlewSequence};
 pub use host::{Host, Now};
 pub use measure::MeasureOptions;

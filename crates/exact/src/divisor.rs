@@ -4,20 +4,27 @@
 //! 1971, doi:10.1145/321662.321664). Images in one variable first show which variables it contains; the
 //! others are replaced by numbers. Every result is verified by division.
 
-use std::cmp::Ordering;
+mod terms;
+
 use std::collections::BTreeMap;
 
 use crate::groebner::{OverLimit, RemainingWork};
 use crate::multivariate::{Monomial, Polynomial};
 use crate::{Field, SplitMix64, polynomial};
+use terms::{Lex, PointValues, along, image, joined, lead, monomial_content, ratio, top, without};
+
+pub use terms::lexicographic;
 
 /// Work per term of a product, or of a copy: its monomial is allocated and inserted among the others.
 const TERM: u64 = 4;
+
 /// Number of terms above which a polynomial exceeds the cache, and the factor on the work per term
 /// then.
 const FAR: (u64, u64) = (4096, 8);
+
 /// Work per inverse of a number.
 const INVERSE: u64 = 16;
+
 /// Largest power of a variable: images along it are dense.
 const POWER: u64 = 1 << 16;
 
@@ -34,109 +41,6 @@ pub struct Algebra {
 /// Work of `terms` terms that are made or copied.
 pub(crate) fn work_of(terms: u64) -> u64 {
     terms.saturating_mul(if terms > FAR.0 { TERM * FAR.1 } else { TERM })
-}
-
-/// Monomial in lexicographic order, the first variable greatest.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Lex(Monomial);
-
-impl Ord for Lex {
-    fn cmp(&self, other: &Self) -> Ordering {
-        lexicographic(&self.0, &other.0)
-    }
-}
-
-impl PartialOrd for Lex {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-/// Values `(x, c(x))` of the coefficients of a polynomial at points of a variable.
-type PointValues = BTreeMap<Lex, Vec<(u64, u64)>>;
-
-/// Leading coefficient.
-fn top(parts: &BTreeMap<Lex, Vec<u64>>) -> Vec<u64> {
-    parts.values().next_back().cloned().unwrap_or_default()
-}
-
-/// Lexicographic order of monomials, the first variable greatest; products preserve it.
-pub fn lexicographic(a: &[(u32, u32)], b: &[(u32, u32)]) -> Ordering {
-    for (x, y) in a.iter().zip(b) {
-        let order = y.0.cmp(&x.0).then(x.1.cmp(&y.1));
-        if order != Ordering::Equal {
-            return order;
-        }
-    }
-    a.len().cmp(&b.len())
-}
-
-/// The greatest monomial in lexicographic order with its coefficient.
-fn lead(p: &Polynomial) -> Option<(&Monomial, u64)> {
-    p.terms().max_by(|a, b| lexicographic(a.0, b.0))
-}
-
-/// `a / b` of monomials, where `b` divides `a`.
-fn ratio(a: &[(u32, u32)], b: &[(u32, u32)]) -> Option<Monomial> {
-    let mut out = a.to_vec();
-    for &(v, e) in b {
-        let at = out.iter().position(|x| x.0 == v && x.1 >= e)?;
-        out[at].1 -= e;
-    }
-    out.retain(|x| x.1 > 0);
-    Some(out)
-}
-
-/// The greatest monomial that divides every term.
-fn monomial_content(p: &Polynomial) -> Monomial {
-    let mut terms = p.terms();
-    let mut out = terms.next().map(|t| t.0.clone()).unwrap_or_default();
-    for (m, _) in terms {
-        for x in &mut out {
-            x.1 = x.1.min(m.iter().find(|y| y.0 == x.0).map_or(0, |y| y.1));
-        }
-        out.retain(|x| x.1 > 0);
-    }
-    out
-}
-
-/// `p / m`, where `m` divides every term.
-fn without(f: &Field, p: &Polynomial, m: &[(u32, u32)]) -> Polynomial {
-    let mut out = Polynomial::default();
-    for (n, c) in p.terms() {
-        out.put(f, ratio(n, m).unwrap_or_default(), c);
-    }
-    out
-}
-
-/// Coefficients along one variable, by the monomial in the other variables.
-fn along(p: &Polynomial, v: u32) -> BTreeMap<Lex, Vec<u64>> {
-    let mut out: BTreeMap<Lex, Vec<u64>> = BTreeMap::new();
-    for (m, c) in p.terms() {
-        let mut rest = m.clone();
-        let at = rest.iter().position(|x| x.0 == v);
-        let power = at.map_or(0, |i| rest.remove(i).1) as usize;
-        let list = out.entry(Lex(rest)).or_default();
-        list.resize(list.len().max(power + 1), 0);
-        list[power] = c;
-    }
-    out
-}
-
-/// Inverse of [`along`].
-fn joined(f: &Field, parts: &BTreeMap<Lex, Vec<u64>>, v: u32) -> Polynomial {
-    let mut out = Polynomial::default();
-    for (m, coefficients) in parts {
-        for (k, &c) in coefficients.iter().enumerate() {
-            let mut m = m.0.clone();
-            if k > 0 {
-                let at = m.partition_point(|x| x.0 < v);
-                m.insert(at, (v, k as u32));
-            }
-            out.put(f, m, c);
-        }
-    }
-    out
 }
 
 impl Algebra {
@@ -473,149 +377,5 @@ impl Algebra {
     }
 }
 
-/// A polynomial along one variable, with numbers for all others.
-fn image(f: &Field, p: &Polynomial, point: &[u64], v: u32) -> Vec<u64> {
-    let mut out = vec![0; p.degree_in(v) as usize + 1];
-    for (m, c) in p.terms() {
-        let (mut value, mut power) = (c, 0);
-        for &(w, e) in m {
-            match w == v {
-                true => power = e as usize,
-                false => value = f.mul(value, f.pow(point[w as usize], e.into())),
-            }
-        }
-        out[power] = f.add(out[power], value);
-    }
-    polynomial::trim(out)
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const P: u64 = (1 << 60) + 33;
-
-    fn algebra(seed: u64) -> Algebra {
-        Algebra { f: Field::new(P), rng: SplitMix64::new(seed), work: RemainingWork::new(1 << 32) }
-    }
-
-    /// Random polynomial of a few small terms.
-    fn drawn(f: &Field) -> impl Strategy<Value = Polynomial> + use<> {
-        let f = *f;
-        let term = (prop::collection::vec((0u32..5, 1u32..3), 0..3), 1i64..20);
-        prop::collection::vec(term, 1..5).prop_map(move |terms| {
-            let mut out = Polynomial::default();
-            for (powers, c) in terms {
-                let mut product = Polynomial::constant(f.from_i64(c));
-                for (v, e) in powers {
-                    for _ in 0..e {
-                        let mut next = Polynomial::default();
-                        next.add_product(&f, &product, &Polynomial::variable(&f, v));
-                        product = next;
-                    }
-                }
-                out.add_scaled(&f, &product, f.one());
-            }
-            out
-        })
-    }
-
-    proptest! {
-        /// The quotient `gcd(a c, b c) / c` divides the common divisor of `a` and `b`, also at points.
-        #[test]
-        fn common_divisors(
-            a in drawn(&Field::new(P)),
-            b in drawn(&Field::new(P)),
-            c in drawn(&Field::new(P)),
-            seed in any::<u64>(),
-        ) {
-            let mut s = algebra(seed);
-            let (x, y) = (s.product(&a, &c).expect("work"), s.product(&b, &c).expect("work"));
-            let d = s.divisor(&x, &y).expect("work");
-            let (p, q) = (s.quotient(&x, &d).expect("work"), s.quotient(&y, &d).expect("work"));
-            let (p, q) = (p.expect("it divides"), q.expect("it divides"));
-            prop_assert!(s.quotient(&d, &c).expect("work").is_some(), "{d:?} without {c:?}");
-            // no common divisor is left: along no variable, at a random point
-            let point: Vec<u64> = (0..5).map(|_| s.number()).collect();
-            for v in 0..5 {
-                let [p, q] = [&p, &q].map(|p| image(&s.f, p, &point, v));
-                prop_assert_eq!(polynomial::gcd(&s.f, p, q).len(), 1);
-            }
-            prop_assert_eq!(s.product(&p, &d).expect("work"), x);
-        }
-
-        /// Factors multiply to the whole, and factors in different variables are separated.
-        #[test]
-        fn factors_multiply_to_the_whole(a in drawn(&Field::new(P)), b in drawn(&Field::new(P)), seed in any::<u64>()) {
-            let mut s = algebra(seed);
-            let square = s.product(&b, &b).expect("work");
-            let whole = s.product(&a, &square).expect("work");
-            let mut product = Polynomial::constant(s.leading(&whole));
-            let factors = s.factors(&whole).expect("work");
-            for (p, e) in &factors {
-                for _ in 0..*e {
-                    product = s.product(&product, p).expect("work");
-                }
-            }
-            prop_assert_eq!(product, whole);
-            if b.degree() > 0 {
-                prop_assert!(factors.iter().any(|x| x.1 > 1), "{:?}", factors);
-            }
-        }
-    }
-
-    #[test]
-    fn what_does_not_divide_and_what_is_too_much() {
-        let mut s = algebra(1);
-        let f = s.f;
-        let [x, y] = [0, 1].map(|v| Polynomial::variable(&f, v));
-        let mut sum = x.clone();
-        sum.add_scaled(&f, &y, f.one());
-        assert_eq!(s.quotient(&x, &sum), Ok(None));
-        assert_eq!(s.quotient(&sum, &x), Ok(None));
-        let square = s.product(&sum, &sum).expect("work");
-        assert_eq!(s.quotient(&square, &sum), Ok(Some(sum.clone())));
-        s.work.left = 3;
-        assert_eq!(s.product(&sum, &sum), Err(OverLimit));
-    }
-
-    /// Every pass over the terms counts as work, also without products: copies of polynomials whose
-    /// terms share no power, images along a variable, division by a number. Dense images are as long as
-    /// the power is high.
-    #[test]
-    fn what_is_copied_is_counted() {
-        let mut s = algebra(3);
-        let f = s.f;
-        let power = |e: u32| {
-            let mut out = Polynomial::default();
-            out.put(&f, vec![(0, e)], f.one());
-            out
-        };
-        let mut long = Polynomial::default();
-        (0..1000).for_each(|k| long.put(&f, vec![(0, 1), (1, k + 1)], f.from_u64(k.into())));
-        let two = Polynomial::constant(f.from_u64(2));
-        let mut spent = |work: &mut dyn FnMut(&mut Algebra)| {
-            let before = s.work.left;
-            work(&mut s);
-            before - s.work.left
-        };
-        let copies = 2 * TERM * long.len() as u64;
-        assert!(spent(&mut |s| drop(s.divisor(&long, &two).expect("work"))) >= copies);
-        assert!(spent(&mut |s| drop(s.quotient(&long, &two).expect("work"))) >= copies);
-        // 1000 and 2000 numbers along the variable
-        let images = spent(&mut |s| {
-            let mut a = power(1000);
-            a.put(&f, vec![(1, 1)], f.one());
-            let mut b = power(2000);
-            b.put(&f, vec![(1, 2)], f.one());
-            s.divisor(&a, &b).expect("work");
-        });
-        assert!(images >= 1000 * 2000, "{images}");
-        // powers beyond 32 bits are refused at once, whatever work is left
-        let high = power(40_000);
-        assert_eq!(s.product(&high, &high), Err(OverLimit));
-        assert_eq!(s.product(&power(u32::MAX), &high), Err(OverLimit));
-        assert_eq!(s.product(&power(32_768), &power(32_768)), Ok(power(65_536)));
-    }
-}
+mod tests;

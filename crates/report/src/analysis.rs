@@ -15,7 +15,7 @@ fn positions(positions: &[PositionReport]) -> DocumentBlock {
     let row = |p: &PositionReport| {
         let mut row = vec![
             p.name.clone(),
-            words::angles(p),
+            words::assumptions::angles(p),
             p.attitude.clone().unwrap_or_default(),
             p.g_c.map_or_else(String::new, |g| g.map(short).join(", ")),
         ];
@@ -61,7 +61,7 @@ fn verdicts(a: &Analysis) -> [DocumentBlock; 2] {
         let how = solved(&q.solution, words::explanation(q));
         row(vec![expression(&q.name), q.unit.as_str().into()], q.status, q.degree, q.accuracy_order, how)
     });
-    let combinations = words::combinations(a).map(|c| {
+    let combinations = words::assumptions::combinations(a).map(|c| {
         let asked = if c.requested { " (asked for)" } else { "" };
         let name = expression(&c.expression);
         let name = TableCell { text: format!("{}{asked}", c.expression), ..name };
@@ -165,11 +165,12 @@ impl Answer for Analysis {
             "Z in n, and psi, eps in n at each position",
             self.formulas.iter().flatten().map(formula),
         ));
-        blocks.extend(DocumentBlock::list_if_any("Under the other carries", words::carries(self)));
+        blocks
+            .extend(DocumentBlock::list_if_any("Under the other carries", words::assumptions::carries(self)));
         blocks
             .extend(self.omitted.as_ref().map(|o| DocumentBlock::list("Not estimated", omitted::classes(o))));
         blocks.extend(gimbals::block(self.gimbals.as_ref()));
-        blocks.push(DocumentBlock::list("Assumed", words::assumptions(self)));
+        blocks.push(DocumentBlock::list("Assumed", words::assumptions::assumptions(self)));
         let notes = self.notes.iter().map(|n| format!("note: {n}"));
         blocks.push(DocumentBlock::list(
             "Certainty",

@@ -405,7 +405,7 @@ fn lead(c: &Calibration) -> Vec<String> {
     let mut lead = vec![match c.consistent {
         true => format!(
             "consistent: the model and its sigmas explain the record, as far as it can tell{}",
-            omitted::silent(&c.omitted)
+            omitted::calibration::silent(&c.omitted)
         ),
         false => "NOT consistent: sigmas are not to be relied upon as they are".into(),
     }];
@@ -419,7 +419,7 @@ fn lead(c: &Calibration) -> Vec<String> {
     }));
     let accepted = c.acceptance.as_ref().and_then(acceptance::sentence);
     lead.extend(accepted.map(|text| format!("{}.", stated::capital(&text))));
-    lead.extend(omitted::of_requirements(c));
+    lead.extend(omitted::calibration::of_requirements(c));
     lead.extend(left_open(c));
     let chosen = values_by_default(&c.assumed);
     lead.extend(chosen.map(|listed| format!("not stated, chosen by the program: {listed}")));
@@ -549,7 +549,7 @@ impl Answer for Calibration {
         blocks.push(DocumentBlock::list("Mode", mode(self)));
         blocks.push(DocumentBlock::list("Fit", fit(self)));
         blocks.extend(DocumentBlock::list_if_any("Next runs", next_runs(&self.next_runs)));
-        blocks.push(DocumentBlock::list("Not estimated", omitted::calibration(&self.omitted)));
+        blocks.push(DocumentBlock::list("Not estimated", omitted::calibration::calibration(&self.omitted)));
         blocks.push(positions(self));
         blocks.push(channels(self));
         blocks.extend(outliers(self));

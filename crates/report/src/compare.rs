@@ -345,7 +345,7 @@ fn noise_floor(schemes: &[ComparedScheme]) -> Vec<DocumentBlock> {
         return Vec::new();
     }
     let mut columns = vec![left("coefficient"), left("scheme"), left("unit")];
-    columns.extend(words::FLOOR.map(right));
+    columns.extend(words::run::FLOOR.map(right));
     let mut names: Vec<&String> = Vec::new();
     for c in floors().flat_map(|(_, f)| &f.coefficients) {
         if !names.contains(&&c.name) {
@@ -357,11 +357,11 @@ fn noise_floor(schemes: &[ComparedScheme]) -> Vec<DocumentBlock> {
         for (r, f) in floors() {
             let of = f.coefficients.iter().filter(|c| c.name == *name);
             let lead = |c: &CoefficientFloor| vec![name.clone(), r.name.clone(), c.unit.clone()];
-            rows.extend(of.map(|c| [lead(c), words::floor(c).into()].concat()));
+            rows.extend(of.map(|c| [lead(c), words::run::floor(c).into()].concat()));
         }
     }
-    let own = floors().map(|(r, f)| format!("{}: {}", r.name, words::floor_of(f).join("; ")));
-    let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(own);
+    let own = floors().map(|(r, f)| format!("{}: {}", r.name, words::run::floor_of(f).join("; ")));
+    let means = words::run::FLOOR_MEANS.map(String::from).into_iter().chain(own);
     vec![
         DocumentBlock::table("Noise floor", columns, rows),
         DocumentBlock::list("Noise floor: what it is", means.collect()),

@@ -9,7 +9,8 @@ use obsdeg_evidence::crosscheck::{
 use crate::Answer;
 use crate::document::{Document, DocumentBlock, left, number, optional, right};
 use crate::simulation::{conditions, validity, warning};
-use crate::words::{self, band, wrong_below};
+use crate::words::run::band;
+use crate::words::{self, wrong_below};
 
 /// Mark of the outcome of a check.
 fn mark(outcome: Agreement) -> String {

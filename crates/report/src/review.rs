@@ -3,26 +3,31 @@
 mod actions;
 pub(crate) mod answers;
 pub(crate) mod calibrated;
+mod evidence;
 mod first;
 mod generic;
 mod model;
 mod notation;
 mod pictures;
+mod positions;
+mod sections;
+mod sensitivity;
 pub(crate) mod title;
+mod unknowns;
 mod verdict;
 
 use obsdeg_calibration::Calibration;
-use obsdeg_core::analysis::Analysis;
-use obsdeg_core::degree::Status;
-use obsdeg_design::design::Minimum;
 use obsdeg_design::review::{DesignReview, SchemeReview};
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
-use obsdeg_evidence::simulation::Outcome;
 
-use crate::analysis::null_vector;
-use crate::document::{Document, DocumentBlock, Fold, TableCell, Typeset, left, number, optional, right};
-use crate::excess::Excess;
-use crate::{Answer, Origin, budget, compare, gimbals, latex, omitted, resolve, simulation, stated, words};
+use crate::Answer;
+use crate::document::{Document, DocumentBlock, Fold};
+use crate::{Origin, budget, compare, omitted, simulation, stated, words};
+use evidence::{evidence_of, run};
+use positions::{numbers, positions};
+use sections::section;
+use sensitivity::{correlated, fewest, sensitivity};
+use unknowns::{not_estimated, null_space, solved, unknowns};
 
 /// Note on the effect of a calibration on the review of its scheme.
 const CALIBRATED: &str = "The run that is simulated of its scheme, and the check whether the small-angle \
@@ -182,18 +187,6 @@ fn certificates(origin: &Origin) -> Option<DocumentBlock> {
     (!origin.certificates.is_empty()).then(|| DocumentBlock::fold(1, "How to check this without obsdeg", own))
 }
 
-fn section(level: usize, title: impl Into<String>) -> DocumentBlock {
-    DocumentBlock::Section { level, title: title.into() }
-}
-
-fn is_list(block: &DocumentBlock, name: &str) -> bool {
-    matches!(block, DocumentBlock::List { heading, .. } if heading == name)
-}
-
-fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    names.collect::<Vec<_>>().join(", ")
-}
-
 /// Two pages and the appendix of a scheme. Of several schemes a printed page has the two pages alone.
 fn scheme(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, review: &ComparedScheme, alone: bool, id: &str) {
     let level = if alone { 1 } else { 2 };
@@ -234,7 +227,9 @@ fn scheme(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, review: &ComparedSc
 
 /// Numbers of positions and of unknowns above which a printed appendix leaves out what matters least.
 const MANY_POSITIONS: usize = 7;
+
 const MANY_UNKNOWNS: usize = 20;
+
 const SECONDARY: [&str; 2] = ["Positions in numbers", "Sensitivity"];
 
 /// Verdict in sentences, with its conditions in one list.
@@ -295,13 +290,13 @@ fn appendix(
     let a = &s.analysis;
     let mut indistinguishable = Vec::new();
     null_space(&mut indistinguishable, a);
-    let mut assumed = words::assumptions(a);
+    let mut assumed = words::assumptions::assumptions(a);
     // carry, latitude and observation are stated above
     assumed
         .extend(stated::measurement(&review.conditions).into_iter().filter(|l| !l.starts_with("latitude")));
     assumed.extend(simulation::conditions(&s.simulation.conditions, &s.simulation.timeline));
     assumed.push(words::certainty(a));
-    let evidence = s.evidence.as_ref().err().map(words::no_evidence);
+    let evidence = s.evidence.as_ref().err().map(words::run::no_evidence);
     let alternatives = s.alternatives.refused.iter().map(|e| format!("no alternatives: {e}"));
     let notes = alike(&a.notes).into_iter().chain(evidence).chain(alternatives);
     assumed.extend(notes.map(|n| format!("note: {n}")));
@@ -320,486 +315,4 @@ fn appendix(
         ("Validity of the small-angle model", valid),
         ("Assumptions and certainty", vec![DocumentBlock::list("", assumed)]),
     ]
-}
-
-/// `with derivatives up to order 2 (D_FY, D_IY)`: names if only some unknowns need that order.
-fn derivatives<'a>(worst: usize, all: impl Iterator<Item = (&'a str, Option<usize>)>) -> String {
-    let all: Vec<_> = all.collect();
-    let names: Vec<&str> = all.iter().filter(|q| q.1 == Some(worst)).map(|q| q.0).collect();
-    match (worst, names.len() == all.len()) {
-        (0, _) => "without any derivative".into(),
-        (k, true) => format!("with derivatives up to order {k}"),
-        (k, false) => format!("with derivatives up to order {k} ({})", names.join(", ")),
-    }
-}
-
-/// Largest number of rows of a table in the printed part of an appendix.
-const PRINTED: usize = 14;
-
-/// Effects of errors that the scheme does not estimate; with a bench also the budgets. Long tables are
-/// details.
-fn not_estimated(review: &ComparedScheme) -> Vec<DocumentBlock> {
-    let (effects, budgets) = omitted::in_full(&review.omitted);
-    let long = |b: &DocumentBlock| matches!(b, DocumentBlock::Table { rows, .. } if rows.len() > PRINTED);
-    let (long, mut out): (Vec<DocumentBlock>, Vec<DocumentBlock>) = effects.into_iter().partition(long);
-    out.extend(DocumentBlock::details(3, "Every error that is not estimated", long));
-    out.extend(DocumentBlock::details(3, "Uncertainty budgets, line by line", budgets));
-    out
-}
-
-fn unknowns(a: &Analysis, review: &ComparedScheme) -> DocumentBlock {
-    let row = |q: &obsdeg_core::analysis::Quantity| {
-        let predicted = review.quantities.iter().find(|p| p.name == q.name);
-        let of = |value: fn(&Quantity) -> Option<f64>| optional(predicted.and_then(value));
-        let excited = predicted.map_or_else(Vec::new, |p| {
-            let names = review.positions.iter().zip(&p.excitation).filter(|(_, e)| **e > 1e-9);
-            names.map(|(n, _)| n.as_str()).collect()
-        });
-        vec![
-            q.name.clone(),
-            predicted.map_or_else(|| q.unit.clone(), |p| p.unit.clone()),
-            q.status.to_string(),
-            words::degree(q.degree),
-            words::accuracy_order(q.degree, q.accuracy_order, a.has_accuracy_orders),
-            if q.partners.is_empty() { "-".into() } else { q.partners.join(" ") },
-            of(|p| p.sigma),
-            of(|p| p.total),
-            of(|p| p.requirement),
-            of(|p| p.margin),
-            if excited.is_empty() { "-".into() } else { excited.join(" ") },
-        ]
-    };
-    DocumentBlock::table(
-        format!(
-            "Every unknown, best first (- where it is not determined; {})",
-            stated::predicted(&review.conditions)
-        ),
-        [
-            left("unknown"),
-            left("unit"),
-            left("status"),
-            right("degree"),
-            right("accuracy order"),
-            left("not told from"),
-            right("predicted sigma"),
-            right(TOTAL),
-            right("required"),
-            right("margin"),
-            left("excited at"),
-        ],
-        a.quantities.iter().map(row),
-    )
-    .without(&left_out(review))
-}
-
-/// Title of the column of total uncertainties.
-const TOTAL: &str = "total with the bench";
-
-/// Columns that are empty without requirements or without a bench.
-fn left_out(review: &ComparedScheme) -> Vec<&'static str> {
-    let required: &[&str] = if review.requirements.stated > 0 { &[] } else { &compare::REQUIREMENTS };
-    let bench = review.conditions.bench.is_none().then_some(TOTAL);
-    required.iter().copied().chain(bench).collect()
-}
-
-fn null_space(blocks: &mut Vec<DocumentBlock>, a: &Analysis) {
-    let mut lines = Vec::new();
-    for v in &a.null_space {
-        let names = joined(v.iter().map(|c| c.name.as_str()));
-        let parts: Vec<String> = (v.iter())
-            .map(|c| match &c.coefficient {
-                Some(k) => format!("{} by {k}", c.name),
-                None => c.name.clone(),
-            })
-            .collect();
-        lines.push(match v.len() {
-            1 => format!("no derivative of Z changes with {names}"),
-            _ => format!("no derivative of Z changes when these change together: {}", parts.join(", ")),
-        });
-    }
-    let silent = words::not_excited(a);
-    if !silent.is_empty() {
-        lines.push(format!("no position excites {}: each can take any value", silent.join(", ")));
-    }
-    if lines.is_empty() {
-        lines.push("nothing: every unknown is observable by derivatives".into());
-    }
-    let seen: Vec<&str> = (a.quantities.iter())
-        .filter(|q| q.degree.is_none() && q.accuracy_order.is_some())
-        .map(|q| q.name.as_str())
-        .collect();
-    if !seen.is_empty() {
-        lines.push(format!(
-            "with dwell, during which psi moves, these are determined nonetheless: {}",
-            seen.join(", ")
-        ));
-    }
-    blocks.push(DocumentBlock::list("", lines));
-    blocks.extend(DocumentBlock::formulas(words::UNSEEN, a.null_space.iter().map(|v| null_vector(v))));
-    let combination = |c: &obsdeg_core::analysis::CombinationReport| {
-        let asked = if c.requested { ", asked for" } else { "" };
-        let dwell = match words::with_dwell(a, c.degree, c.accuracy_order) {
-            same if same.is_empty() => same,
-            other => format!(", with dwell {other}"),
-        };
-        let verdict = match c.degree {
-            Some(k) => format!("degree {k}{dwell}{asked}"),
-            None => format!("{}{dwell}{asked}", c.status),
-        };
-        Typeset {
-            text: format!("{}: {verdict}", c.expression),
-            latex: format!("{}\\quad\\text{{{verdict}}}", latex::expression(&c.expression)),
-        }
-    };
-    blocks
-        .extend(DocumentBlock::formulas("Observable combinations", words::combinations(a).map(combination)));
-}
-
-/// A time in s, to a tenth.
-fn seconds(t: f64) -> String {
-    let text = format!("{t:.1}");
-    text.strip_suffix(".0").map_or(text.clone(), String::from)
-}
-
-/// A time in s, and in minutes, hours or days if it is long: `2628.1 s (44 min)`, `5000 s (1 h 23 min)`.
-fn duration(t_s: f64) -> String {
-    let minutes = (t_s / 60.0).round() as u64;
-    let (hours, days) = (minutes / 60, minutes / 1440);
-    let long = match (days, hours) {
-        (2.., _) => format!(" ({days} d {} h)", hours % 24),
-        (_, 1..) => format!(" ({hours} h {} min)", minutes % 60),
-        _ if minutes >= 2 => format!(" ({minutes} min)"),
-        _ => String::new(),
-    };
-    format!("{} s{long}", seconds(t_s))
-}
-
-fn positions(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, id: &str) {
-    let rows = s.analysis.positions.iter().zip(&s.positions).map(|(p, numbers)| {
-        vec![
-            p.name.clone(),
-            words::angles(p),
-            p.attitude.clone().unwrap_or_else(|| "-".into()),
-            seconds(numbers.start_s),
-            seconds(numbers.dwell_s),
-            numbers.slew_s.map_or_else(|| "-".into(), seconds),
-            numbers.turn.map_or_else(|| "-".into(), |turn| words::turn(&turn)),
-        ]
-    });
-    let columns = [
-        left("position"),
-        left("alpha, beta, gamma [deg]"),
-        left("X_p Y_p Z_p"),
-        right("start [s]"),
-        right("dwell [s]"),
-        right("slew to it [s]"),
-        left("turn"),
-    ];
-    let table = DocumentBlock::table("Positions in order of time", columns, rows);
-    let empty = |all: &dyn Fn(usize) -> bool| (0..s.positions.len()).all(all);
-    let unused = [
-        ("X_p Y_p Z_p", empty(&|i| s.analysis.positions[i].attitude.is_none())),
-        ("slew to it [s]", empty(&|i| s.positions[i].slew_s.is_none())),
-        ("turn", empty(&|i| s.positions[i].turn.is_none())),
-    ];
-    let unused: Vec<&str> = unused.into_iter().filter(|c| c.1).map(|c| c.0).collect();
-    blocks.push(table.without(&unused));
-    blocks.extend(gimbals::block(s.analysis.gimbals.as_ref()));
-    let at = &s.simulation.conditions;
-    blocks.extend(pictures::poses(&s.poses, at.latitude_deg, at.latitude_by_default, id));
-}
-
-/// Gravity along the axes of the gyros at each position, and what each position excites.
-fn numbers(
-    s: &SchemeReview,
-    coefficients: &[&Quantity],
-    review: &ComparedScheme,
-    id: &str,
-) -> Vec<DocumentBlock> {
-    let component = |x: f64| if x == x.round() { format!("{x:.0}") } else { format!("{x:.3}") };
-    let g = |g: [f64; 3]| g.map(component).join(", ");
-    let row =
-        |p: &obsdeg_design::review::PositionReview| vec![p.name.clone(), g(p.g[0]), g(p.g[1]), g(p.g[2])];
-    let mut out = vec![
-        DocumentBlock::table(
-            "Components of g along the axes I, O, S of each gyro (in g, at the start)",
-            [left("position"), right("gyro X: I O S"), right("gyro Y: I O S"), right("gyro Z: I O S")],
-            s.positions.iter().map(row),
-        ),
-        pictures::attitudes(s, &format!("{id}_attitude")),
-    ];
-    if coefficients.iter().any(|q| !q.excitation.is_empty()) {
-        out.push(pictures::excitation(coefficients, &review.positions, &format!("{id}_excitation")));
-    }
-    out
-}
-
-/// Length in bytes from which a formula is one of many terms or decimals.
-const LONG_FORMULA: usize = 220;
-
-fn solved(a: &Analysis) -> Vec<DocumentBlock> {
-    let formula = |left: String, expression: &str, solution: &obsdeg_core::analysis::Solution| Typeset {
-        text: format!("{expression} = {}", solution.text),
-        latex: format!("{left} = {}", latex::solution(solution, a.frame, &a.stations)),
-    };
-    let unknowns = a.quantities.iter().filter_map(|q| {
-        let solution = q.solution.as_ref()?;
-        Some(formula(latex::symbol(&q.name), &q.name, solution))
-    });
-    let combinations = words::combinations(a).filter_map(|c| {
-        let solution = c.solution.as_ref()?;
-        Some(formula(latex::expression(&c.expression), &c.expression, solution))
-    });
-    let is_long = |f: &Typeset| f.text.len() > LONG_FORMULA;
-    let ((long, short), (long_sums, short_sums)): ((Vec<_>, Vec<_>), (Vec<_>, Vec<_>)) =
-        (unknowns.partition(is_long), combinations.partition(is_long));
-    let none = long.is_empty() && short.is_empty();
-    let mut out: Vec<DocumentBlock> =
-        Vec::from_iter(none.then(|| DocumentBlock::Text("No unknown is observable by itself.".into())));
-    out.extend(DocumentBlock::formulas("Unknowns", short));
-    out.extend(DocumentBlock::formulas("Combinations", short_sums));
-    out.extend(DocumentBlock::list_if_any(words::ACCURACY, words::accuracy(a)));
-    let long = DocumentBlock::formulas("Unknowns", long)
-        .into_iter()
-        .chain(DocumentBlock::formulas("Combinations", long_sums));
-    out.extend(DocumentBlock::details(3, "Formulas of many terms or decimals", long.collect()));
-    out
-}
-
-fn sensitivity(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<DocumentBlock> {
-    let row = |c: &obsdeg_evidence::compare::Sensitivity| {
-        vec![
-            c.condition.clone(),
-            compare::rank(c.rank, review.has_accuracy_orders),
-            compare::worst(c.worst.as_ref()),
-            compare::worst(c.worst_determined.as_ref()),
-        ]
-    };
-    let mut out = vec![DocumentBlock::table(
-        format!(
-            "Rank, and largest {} in deg/h (per g): of all coefficients, of those determined here (- where one \
-             is not observable)",
-            if review.conditions.bench.is_some() { "total uncertainty with the bench" } else { "sigma" }
-        ),
-        [left("condition"), right("rank with dwell"), left("of all"), left("of those determined")],
-        review.sensitivity.iter().map(row),
-    )];
-    out.extend(DocumentBlock::list_if_any("Verdicts under the other carries", words::carries(&s.analysis)));
-    out.extend(pictures::latitudes(s, &format!("{id}_latitude")));
-    out
-}
-
-/// Absolute value from which a correlation of two estimates is listed, and the number of lines.
-const CORRELATED: f64 = 0.9;
-const LINES: usize = 6;
-
-/// Strongest correlations, under a diffuse prior, of the estimates of unknowns that are determined.
-fn correlated(s: &SchemeReview) -> Option<DocumentBlock> {
-    let of = &s.evidence.as_ref().ok()?.correlation;
-    let determined = |name: &str| {
-        let found = s.analysis.quantities.iter().find(|q| q.name == name);
-        found.is_some_and(|q| q.degree.is_some())
-    };
-    let mut pairs: Vec<(f64, &str, &str)> = Vec::new();
-    for (i, a) in of.names.iter().enumerate().filter(|(_, name)| determined(name)) {
-        for (j, b) in of.names.iter().enumerate().take(i).filter(|(_, name)| determined(name)) {
-            pairs.push((of.values[i][j], b, a));
-        }
-    }
-    pairs.retain(|p| p.0.abs() >= CORRELATED);
-    pairs.sort_by(|p, q| q.0.abs().total_cmp(&p.0.abs()));
-    let more = pairs.len().saturating_sub(LINES);
-    let mut lines: Vec<String> =
-        pairs.iter().take(LINES).map(|(r, a, b)| format!("{a} and {b}: {r:.3}")).collect();
-    lines.extend((more > 0).then(|| format!("{more} more pairs")));
-    let title = format!(
-        "Estimates that depend on each other (correlation of {CORRELATED} or more, with a diffuse prior)"
-    );
-    DocumentBlock::list_if_any(title, lines)
-}
-
-/// Sentence on the smallest number of cardinal attitudes that make every coefficient observable.
-fn fewest_of_all(s: &SchemeReview, review: &ComparedScheme) -> Option<String> {
-    let all = s.alternatives.all.as_ref()?;
-    Some(match (all.positions, all.never.is_empty()) {
-        (Some(k), _) => format!(
-            "to observe every coefficient takes at least {k} of the 24 cardinal attitudes under {} carry \
-             (exhaustive search), for instance {}",
-            review.carry,
-            all.witness.join(", ")
-        ),
-        (None, false) => format!("no set of the 24 cardinal attitudes determines {}", all.never.join(", ")),
-        // larger sets were not searched
-        (None, true) => format!(
-            "no set of {} of the 24 cardinal attitudes determines every coefficient",
-            all.none_of.last()?[0]
-        ),
-    })
-}
-
-/// Fewest positions, the best scheme of the cardinal attitudes, and what each position is needed for.
-fn fewest(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, review: &ComparedScheme) {
-    let mut lines = Vec::new();
-    lines.extend(s.alternatives.kept.as_ref().map(|kept| fewest_of_these(kept, s, review)));
-    lines.extend(fewest_of_all(s, review));
-    lines.extend(best_of_all(s));
-    lines.extend(resolve::position_to_drop(review));
-    blocks.push(DocumentBlock::list("", lines));
-    if !review.drop_one.is_empty() {
-        blocks.push(without_one_position(review));
-    }
-}
-
-/// Sentence on the fewest positions of the scheme that observe what it observes.
-fn fewest_of_these(kept: &Minimum, s: &SchemeReview, review: &ComparedScheme) -> String {
-    let required = &s.alternatives.required;
-    match kept.positions {
-        Some(k) if k == s.positions.len() => {
-            // what slews determine besides is in the rows without one position
-            let beside = match review.slews.is_empty() {
-                true => "",
-                false => "; what follows counts the slews too",
-            };
-            format!(
-                "all {k} positions are needed to observe {} by repositioning at once{beside}",
-                required.join(", ")
-            )
-        }
-        Some(k) => format!(
-            "{k} of the {} positions ({}) suffice to observe {}; whether they meet the requirements is \
-             another question",
-            s.positions.len(),
-            kept.witness.join(", "),
-            required.join(", ")
-        ),
-        None => "too many sets of positions to look for the fewest".into(),
-    }
-}
-
-/// Sentence on the best scheme of cardinal attitudes at the dwell of this one, and on the bound of its
-/// criterion.
-fn best_of_all(s: &SchemeReview) -> Option<String> {
-    let alternatives = &s.alternatives;
-    let c = alternatives.certificate.as_ref()?;
-    let same_dwell = |dwell_s: f64| s.positions.first().is_some_and(|p| p.dwell_s == dwell_s);
-    let best = alternatives.front.iter().find(|f| same_dwell(f.dwell_s))?;
-    let Excess { value, bound, percent } = Excess::new(best.value, c.best_possible, c.within_percent);
-    Some(format!(
-        "of {} of the 24 cardinal attitudes at {} s each none has a largest sigma of {} below {bound} \
-         (optimal weights); the best found has {value}, at most {percent} above",
-        alternatives.front_positions,
-        number(best.dwell_s),
-        alternatives.required.join(", "),
-    ))
-}
-
-/// Table of the scheme without one of its positions.
-fn without_one_position(review: &ComparedScheme) -> DocumentBlock {
-    let row = |d: &obsdeg_evidence::compare::DropOne| {
-        let lost = if d.lost.is_empty() { "-".into() } else { d.lost.join(" ") };
-        vec![
-            d.position.clone(),
-            lost,
-            compare::worst(d.worst.as_ref()),
-            compare::requirements(&d.requirements),
-        ]
-    };
-    let figure = match review.conditions.bench.is_some() {
-        true => "worst total(D), with the bench [deg/h, /g]",
-        false => "worst sigma(D) [deg/h, /g]",
-    };
-    let columns = ["without", "not observable any more", figure, compare::REQUIREMENTS[0]].map(left);
-    let table = DocumentBlock::table("Without one position", columns, review.drop_one.iter().map(row));
-    table.without(&left_out(review))
-}
-
-/// Largest number of pictures of slopes, one for each unit, in the printed part of an appendix.
-const SLOPES: usize = 4;
-
-/// Evidence: a line per kind of check that agrees, and the rows of those that do not.
-fn evidence_of(s: &SchemeReview, id: &str) -> Vec<DocumentBlock> {
-    let c = match &s.evidence {
-        Ok(c) => c,
-        Err(e) => return vec![DocumentBlock::Text(format!("None: {}.", words::no_evidence(e)))],
-    };
-    let outcome = match (c.passed, c.verdicts_agree) {
-        (true, _) if c.counts.not_resolvable > 0 => "agree in every check that is resolvable",
-        (true, _) => "agree in every check",
-        (false, true) => "agree, but the Monte Carlo runs do NOT fit the filter, as listed below",
-        (false, false) => "DISAGREE, as listed below",
-    };
-    // the run has the truth of the checks
-    let run = if s.simulation.consistency.consistent { "" } else { ", but the run below is not consistent" };
-    let mut out = vec![DocumentBlock::Text(format!(
-        "Exact verdicts and a Kalman filter are two independent paths: they {outcome}{run}."
-    ))];
-    let Document { lead, blocks, .. } = c.document();
-    out.extend(lead.into_iter().map(DocumentBlock::Text));
-    let (mut agree, mut open, mut details) = (Vec::new(), Vec::new(), Vec::new());
-    for block in blocks {
-        match block {
-            DocumentBlock::Table { heading, columns, rows } => {
-                let fails = |row: &&Vec<TableCell>| {
-                    row.iter().any(|c| c.text == "FAIL" || c.text == "not resolvable")
-                };
-                let failing: Vec<Vec<TableCell>> = rows.iter().filter(fails).cloned().collect();
-                agree.push(format!("{heading}: {} of {} agree", rows.len() - failing.len(), rows.len()));
-                if !failing.is_empty() {
-                    open.push(DocumentBlock::Table {
-                        heading: format!("Not agreeing: {heading}"),
-                        columns: columns.clone(),
-                        rows: failing,
-                    });
-                }
-                details.push(DocumentBlock::Table { heading, columns, rows });
-            }
-            b if is_list(&b, "Assumed") || is_list(&b, "Validity of the small-angle model") => {}
-            b if is_list(&b, "What disagrees") || is_list(&b, "Not resolvable, and why") => open.push(b),
-            b => details.push(b),
-        }
-    }
-    out.push(DocumentBlock::list("Checks", agree));
-    out.extend(open);
-    let mut slopes = pictures::slopes(c, id);
-    let more = slopes.split_off(slopes.len().min(SLOPES));
-    out.extend(slopes);
-    out.extend(pictures::consistency(c, id));
-    details.extend(more);
-    details.push(pictures::correlation(c, &format!("{id}_correlation")));
-    out.extend(DocumentBlock::details(3, "Every check", details));
-    out
-}
-
-/// Number of pictures of errors in the printed part of an appendix.
-const ERRORS: usize = 6;
-
-/// One run against a simulated truth: its lists, the errors of the worst unknowns, and in the details all.
-fn run(s: &SchemeReview, review: &ComparedScheme, id: &str) -> Vec<DocumentBlock> {
-    let blocks = s.simulation.document().blocks.into_iter();
-    let kept = |b: &DocumentBlock| {
-        matches!(b, DocumentBlock::Table { .. } | DocumentBlock::List { .. })
-            && !["Assumed", "Validity of the small-angle model"].iter().any(|name| is_list(b, name))
-            && !matches!(b, DocumentBlock::List { heading, .. } if heading.starts_with("Not estimated"))
-    };
-    // the unknowns' table has the predicted sigmas, and a page has no room for more columns
-    let blocks = blocks.filter(kept).map(|b| b.without(&["predicted"]));
-    let (mut details, mut out): (Vec<DocumentBlock>, Vec<DocumentBlock>) =
-        blocks.partition(|b| matches!(b, DocumentBlock::Table { .. }));
-    out.insert(0, DocumentBlock::Text("One run against a simulated truth, with its errors:".into()));
-    let flat: Vec<&str> = (s.simulation.quantities.iter())
-        .filter(|q| q.status == Status::NotExcited && q.outcome == Outcome::PriorOnly)
-        .map(|q| q.name.as_str())
-        .collect();
-    let margin = |name: &str| review.quantities.iter().find(|q| q.name == name).and_then(|q| q.margin);
-    let mut errors = pictures::errors(&s.traces, &flat, id);
-    errors.sort_by(|(a, _), (b, _)| {
-        margin(a).unwrap_or(f64::INFINITY).total_cmp(&margin(b).unwrap_or(f64::INFINITY))
-    });
-    let mut pictures: Vec<DocumentBlock> = errors.into_iter().map(|(_, picture)| picture).collect();
-    let rest = pictures.split_off(pictures.len().min(ERRORS));
-    out.extend(pictures);
-    out.extend(pictures::not_drawn(&flat));
-    details.extend(rest);
-    out.extend(DocumentBlock::details(3, "Estimates at the end, and the errors of all others", details));
-    out
 }

@@ -49,12 +49,12 @@ pub(crate) fn conditions(c: &ConditionsReport, timeline: &[TimelineReport]) -> V
         format!("repositioning {slew}"),
         format!("timeline {}", parts.join(", ")),
     ];
-    out.extend(c.settle_s.map(words::settle));
+    out.extend(c.settle_s.map(words::run::settle));
     if c.drift_scale != 1.0 {
         out.push(format!("true drifts and their priors times {}", c.drift_scale));
     }
-    out.extend(c.gyro_noise.as_ref().map(words::gyro_noise));
-    let accelerometers = |b| format!("{}: states of filter and truth", words::accelerometer_bias(b));
+    out.extend(c.gyro_noise.as_ref().map(words::run::gyro_noise));
+    let accelerometers = |b| format!("{}: states of filter and truth", words::run::accelerometer_bias(b));
     out.extend(c.accelerometer_bias.as_ref().map(accelerometers));
     out.extend(warning(c));
     out
@@ -168,13 +168,13 @@ fn linear(e: &Estimate) -> Option<Vec<String>> {
 fn outcome(e: &Estimate) -> &'static str {
     match (e.outcome, e.required_sigma) {
         (Outcome::Converging, Some(required)) if e.sigma <= required => "missed by the bench",
-        (outcome, _) => words::outcome(outcome),
+        (outcome, _) => words::run::outcome(outcome),
     }
 }
 
 fn row(e: &Estimate) -> Vec<String> {
     let mut out = vec![e.name.clone(), e.unit.clone()];
-    out.extend(words::estimate(e.degree, [e.truth, e.estimate, e.error, e.sigma], e.error_over_sigma));
+    out.extend(words::run::estimate(e.degree, [e.truth, e.estimate, e.error, e.sigma], e.error_over_sigma));
     out.extend([optional(e.predicted_sigma), optional(e.time_to_requirement_s), outcome(e).into()]);
     out
 }
@@ -263,7 +263,7 @@ fn degree_heading(s: &Simulation) -> &'static str {
 /// Tables of the estimates of unknowns and of combinations.
 fn estimates(s: &Simulation) -> Vec<DocumentBlock> {
     let mut columns = vec![left("unknown"), left("unit")];
-    columns.extend(words::ESTIMATE.map(right));
+    columns.extend(words::run::ESTIMATE.map(right));
     columns.extend([right("predicted"), right("at [s]"), left("outcome")]);
     let table = |heading: &str, rows: &[Estimate]| {
         DocumentBlock::table(heading, columns.clone(), rows.iter().map(row))
@@ -296,7 +296,7 @@ fn beside_linear(s: &Simulation) -> DocumentBlock {
 
 /// Sentences on the consistency of the run.
 fn consistency(s: &Simulation) -> Vec<String> {
-    let mut consistency = words::consistency(&s.consistency);
+    let mut consistency = words::run::consistency(&s.consistency);
     if s.consistency.consistent && !s.filter.trusted {
         consistency[0] = "this run is consistent with its truth, which says little of this filter (see \
                           Filter): the errors of many runs decide (obsdeg crosscheck)"
@@ -308,9 +308,10 @@ fn consistency(s: &Simulation) -> Vec<String> {
 /// Noise floor of the coefficients, with its meaning.
 fn noise_floor(f: &NoiseFloor) -> [DocumentBlock; 2] {
     let mut columns = vec![left("coefficient"), left("unit")];
-    columns.extend(words::FLOOR.map(right));
-    let row = |c: &CoefficientFloor| [vec![c.name.clone(), c.unit.clone()], words::floor(c).into()].concat();
-    let means = words::FLOOR_MEANS.map(String::from).into_iter().chain(words::floor_of(f));
+    columns.extend(words::run::FLOOR.map(right));
+    let row =
+        |c: &CoefficientFloor| [vec![c.name.clone(), c.unit.clone()], words::run::floor(c).into()].concat();
+    let means = words::run::FLOOR_MEANS.map(String::from).into_iter().chain(words::run::floor_of(f));
     [
         DocumentBlock::table("Noise floor", columns, f.coefficients.iter().map(row)),
         DocumentBlock::list("Noise floor: what it is", means.collect()),
@@ -325,7 +326,7 @@ fn assumed(s: &Simulation) -> Vec<String> {
     if !required.is_empty() {
         assumed.push(format!("required sigma {}", required.join(", ")));
     }
-    assumed.extend(s.conditions.bench.as_deref().map(words::bench));
+    assumed.extend(s.conditions.bench.as_deref().map(words::assumptions::bench));
     assumed
 }
 

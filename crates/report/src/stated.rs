@@ -7,7 +7,8 @@ use obsdeg_evidence::simulation::{
 };
 
 use crate::document::number;
-use crate::words::{self, accelerometer_bias, gyro_noise, names};
+use crate::words::run::{accelerometer_bias, gyro_noise};
+use crate::words::{self, names};
 
 /// Largest relative difference at which sigmas of a run count as equal to the predicted ones.
 const EQUAL: f64 = 0.01;
@@ -328,11 +329,11 @@ pub(crate) fn measurement(m: &MeasurementReport) -> Vec<String> {
         format!("{} s at a position unless it says otherwise, {slews}", m.dwell_s),
         format!("latitude {} deg{by}", m.latitude_deg),
     ];
-    out.extend(m.settle_s.map(words::settle));
+    out.extend(m.settle_s.map(words::run::settle));
     out.extend(m.accelerometer_bias.as_ref().map(accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
     out.extend(m.gyro_noise.as_ref().map(gyro_noise));
-    out.extend(m.bench.as_deref().map(words::bench));
+    out.extend(m.bench.as_deref().map(words::assumptions::bench));
     out.extend(m.prior.as_ref().map(|prior| format!("prior {prior} (deg, deg/h, ... as stated)")));
     out
 }

@@ -458,23 +458,23 @@ impl Answer for SystemRun {
             let exact = e.status.map_or_else(|| "start known".into(), |s| s.to_string());
             let verdict = match e.outcome {
                 Outcome::Reached | Outcome::Converging => exact,
-                other => format!("{exact}, {}", words::outcome(other)),
+                other => format!("{exact}, {}", words::run::outcome(other)),
             };
             let mut out = vec![e.name.clone(), e.unit.clone(), verdict];
             let values = [e.truth, e.estimate, e.error, e.sigma];
-            out.extend(words::estimate(e.degree, values, e.error_over_sigma));
+            out.extend(words::run::estimate(e.degree, values, e.error_over_sigma));
             out.push(number(e.prior_sigma));
             out
         };
         let mut columns = vec![left("unknown"), left("unit"), left("status")];
-        columns.extend(words::ESTIMATE.map(right));
+        columns.extend(words::run::ESTIMATE.map(right));
         columns.push(right("prior sigma"));
         let table = DocumentBlock::table(
             "Estimates at the end (verdict and degree: exact, and what the run makes of it)",
             columns,
             self.quantities.iter().map(row),
         );
-        let mut consistency = words::consistency(&self.consistency);
+        let mut consistency = words::run::consistency(&self.consistency);
         // a state whose start is known has no verdict
         let unobservable =
             |e: &SystemEstimate| matches!(e.status, Some(Status::Inseparable | Status::NotExcited));

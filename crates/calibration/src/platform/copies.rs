@@ -4,7 +4,8 @@
 //! Errors that the model lacks are in all records of a platform, but their effects are smooth. So differences
 //! of differences of neighbouring residuals are compared.
 
-use super::diagnose::{AnswerData, MeasurementResidual};
+use super::diagnose::data::AnswerData;
+use super::diagnose::filter_path::MeasurementResidual;
 use crate::answer::CalibrationFinding;
 
 /// Fewest measurements of two records at the same times of the scheme.

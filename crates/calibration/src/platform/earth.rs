@@ -12,7 +12,7 @@ use obsdeg_ekf::consistency::chi_square_band;
 use obsdeg_evidence::simulation::{Conditions, Plan};
 
 use super::clock::bounds;
-use super::diagnose::AnswerData;
+use super::diagnose::data::AnswerData;
 use super::estimate::{PlatformProblem, WEAK};
 use super::placed::{By, Reading, TOLERANCE};
 use super::run::RecordedRun;

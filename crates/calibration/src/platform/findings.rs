@@ -5,7 +5,7 @@
 
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
-use super::diagnose::{AnswerData, MapBoth};
+use super::diagnose::data::{AnswerData, MapBoth};
 use super::gross::GrossReason;
 use super::length::wrong;
 use super::run::RecordedRun;

@@ -2,7 +2,7 @@
 
 use obsdeg_ekf::consistency::chi_square_band;
 
-use super::diagnose::{AnswerData, MapBoth, ReportedFunctional};
+use super::diagnose::data::{AnswerData, MapBoth, ReportedFunctional};
 use crate::answer::{Fit, Repeatability};
 use crate::levels;
 

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Dwell, Euler, Position, Scheme, cardinal, cardinal_name, cardinal_names};
 use obsdeg_evidence::simulation::{Plan, PlanSegment, RunStart, predict, si_per_shown};
 
-use super::diagnose::AnswerData;
+use super::diagnose::data::AnswerData;
 use super::estimate::{RunUnknowns, WEAK};
 use super::run::noise_root;
 use super::{CalibrationError, known};

@@ -4,7 +4,8 @@ use obsdeg_core::model::AZIMUTH;
 use obsdeg_ekf::allan::overlapping_deviation;
 use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail};
 
-use super::diagnose::{AnswerData, MeasurementResidual};
+use super::diagnose::data::AnswerData;
+use super::diagnose::filter_path::MeasurementResidual;
 use super::placed::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
 

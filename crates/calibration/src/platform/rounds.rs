@@ -10,7 +10,8 @@ use obsdeg_ekf::consistency::chi_square_quantile;
 use obsdeg_evidence::prediction::Prediction;
 use obsdeg_evidence::simulation::{Conditions, Plan, PlatformState, RunStart};
 
-use super::diagnose::{AnswerData, Diagnosed};
+use super::diagnose::data::AnswerData;
+use super::diagnose::filter_path::Diagnosed;
 use super::estimate::{PlatformEstimate, PlatformProblem, RunUnknowns};
 use super::observe::observe;
 use super::offset::{Offset, SETTLED};

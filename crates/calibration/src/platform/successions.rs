@@ -2,7 +2,7 @@
 //! platform that moved, and no outliers, which are independent of each other.
 
 use super::CalibrationError;
-use super::diagnose::AnswerData;
+use super::diagnose::data::AnswerData;
 use super::gross::GrossReason;
 use super::placed::channel_name;
 use super::run::RecordedRun;

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::dag::{Dag, Op};
 use super::functions::{gcd, plus, times};
-use super::model::Compiled;
+use super::model::compiled::Compiled;
 use crate::language::Function;
 
 /// Largest number of terms of an argument.
@@ -335,7 +335,7 @@ mod tests {
                     .roles
                     .iter()
                     .map(|r| match r {
-                        crate::system::model::Role::Constant(_) => Reals::<4>.number(15, 1),
+                        crate::system::model::compiled::Role::Constant(_) => Reals::<4>.number(15, 1),
                         _ => Reals::<4>.random(&mut rng, 0),
                     })
                     .collect();

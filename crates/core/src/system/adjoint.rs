@@ -402,7 +402,8 @@ mod tests {
     use obsdeg_exact::{Field, RootField, Scalars, SplitMix64};
 
     use crate::system::model_file;
-    use crate::system::rows::{Layout, PointBuilder, random_field};
+    use crate::system::rows::layout::Layout;
+    use crate::system::rows::point::{PointBuilder, random_field};
     use crate::system::work::Work;
 
     /// Holds the rows of a model against duals in every node; returns true if a Jacobian was used.

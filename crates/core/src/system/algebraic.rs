@@ -7,8 +7,9 @@ use std::collections::HashMap;
 use obsdeg_exact::{Field, SplitMix64};
 
 use super::error::ModelError;
+use super::model::compiled::Role;
 use super::model::{
-    AlgebraicEquation, Constant, KnownInput, Named, PlacedExpression, Role, State, StateStart, SystemModel,
+    AlgebraicEquation, Constant, KnownInput, Named, PlacedExpression, State, StateStart, SystemModel,
 };
 use crate::language::{Environment, Expression, Node, evaluate};
 

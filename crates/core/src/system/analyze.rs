@@ -1,6 +1,7 @@
 //! Analysis of a model, in continuous or discrete time.
 
-use super::answer::{SystemAnalysis, SystemOptions, analyzed};
+use super::answer::analyzed;
+use super::answer::data::{SystemAnalysis, SystemOptions};
 use super::discrete::analyze_discrete;
 use super::error::ModelError;
 use super::model::SystemModel;

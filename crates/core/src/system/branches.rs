@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::constraints::slots_of;
 use super::dag::Op;
-use super::model::{Compiled, Role, SystemModel};
+use super::model::SystemModel;
+use super::model::compiled::{Compiled, Role};
 use super::text::text;
 use crate::language::Function;
 

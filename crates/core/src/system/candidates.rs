@@ -5,8 +5,9 @@ use std::ops::Range;
 use serde_spanned::Spanned;
 use toml::Value;
 
+use super::error::FilePlace;
 use super::error::ModelError;
-use super::model::{Candidate, FilePlace, MAX_EXPERIMENTS, Named, PlacedExpression, SystemModel};
+use super::model::{Candidate, MAX_EXPERIMENTS, Named, PlacedExpression, SystemModel};
 use super::reader::{ModelEntry, ModelReader, base};
 use crate::language::{Expression, Node, Shape, Shapes, nearest, parse_components};
 

@@ -5,11 +5,10 @@ use std::ops::Range;
 
 use super::constraints::{below, slots_of};
 use super::dag::{Dag, DagError, Op};
+use super::error::FilePlace;
 use super::error::ModelError;
-use super::model::{
-    Compiled, CompiledExperiment, CompiledSegment, FilePlace, KnownInput, MAX_NODES, ModelSegment,
-    PlacedExpression, Role, StateStart, SystemModel,
-};
+use super::model::compiled::{Compiled, CompiledExperiment, CompiledSegment, Role};
+use super::model::{KnownInput, MAX_NODES, ModelSegment, PlacedExpression, StateStart, SystemModel};
 use crate::language::{Node, among, nearest};
 
 /// Nodes by name.

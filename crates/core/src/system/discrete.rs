@@ -3,12 +3,14 @@
 
 use std::collections::HashSet;
 
-use super::answer::{Analyzed, NumberOfSolutions, SystemAnalysis, SystemOptions, SystemQuantity, analyzed};
+use super::answer::data::{NumberOfSolutions, SystemAnalysis, SystemOptions, SystemQuantity};
+use super::answer::{Analyzed, analyzed};
+use super::error::FilePlace;
 use super::error::ModelError;
-use super::judge::{Judgement, judge};
-use super::model::{
-    Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StartTime, StateStart, SystemModel,
-};
+use super::judge::judge;
+use super::judge::verdicts::Judgement;
+use super::model::compiled::Role;
+use super::model::{Constant, KnownInput, Named, PlacedExpression, StartTime, StateStart, SystemModel};
 use super::quotients::QuotientTerms;
 use crate::degree::status::Status;
 use crate::language::{Expression, Function, Node};

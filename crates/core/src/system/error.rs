@@ -23,3 +23,20 @@ pub struct ModelError {
     /// Byte range in the file; `None` where it is not known.
     pub span: Option<Range<usize>>,
 }
+
+/// Place of a text in a model file.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FilePlace {
+    /// Description of the entry: `the equation of x1`.
+    pub what: String,
+    /// Byte offset in the file at which the text begins; `None` if it is unknown.
+    pub offset: Option<usize>,
+}
+
+impl FilePlace {
+    /// Error in the text of this place, at a byte range of it.
+    pub fn error(&self, message: String, range: Range<usize>) -> ModelError {
+        let span = self.offset.map(|o| o + range.start..o + range.end);
+        ModelError { what: self.what.clone(), message, span }
+    }
+}

@@ -6,10 +6,10 @@ use std::collections::HashMap;
 use obsdeg_exact::{Ball, Reals};
 
 use super::constraints::ConstraintFactor;
-use super::judge::climb_at;
+use super::judge::point_degrees::climb_at;
 use super::model::{PlacedExpression, SystemModel};
 use super::real_points::real_point;
-use super::rows::Layout;
+use super::rows::layout::Layout;
 use super::work::Spent;
 use crate::language::{Expression, Node, component, evaluate_f64};
 

@@ -1,8 +1,8 @@
 //! Products of powers among which identifiable functions are sought.
 
 use super::function_factors::ModelFactors;
-use super::judge::Judgement;
-use super::model::Role;
+use super::judge::verdicts::Judgement;
+use super::model::compiled::Role;
 use super::quotients::QuotientPowers;
 use super::symmetry::{Symmetries, integers};
 

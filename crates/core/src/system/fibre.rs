@@ -26,10 +26,12 @@ use obsdeg_exact::{Field, SplitMix64, polynomial};
 use super::dag::Op;
 use super::function_factors::ModelFactors;
 use super::global::RelationConsequences;
-use super::judge::Judgement;
-use super::model::{Compiled, Role, SystemModel};
+use super::judge::verdicts::Judgement;
+use super::model::SystemModel;
+use super::model::compiled::{Compiled, Role};
 use super::quotients::{QuotientTerms, Quotients};
-use super::rows::{Layout, SystemRows, Unknown};
+use super::rows::SystemRows;
+use super::rows::layout::{Layout, Unknown};
 use super::undecided::{LONGEST, NotCounted};
 use super::work;
 

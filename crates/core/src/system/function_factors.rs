@@ -3,8 +3,9 @@
 use obsdeg_exact::Field;
 
 use super::dag::Op;
-use super::model::{Compiled, KnownInput, Role, SystemModel};
-use super::rows::Layout;
+use super::model::compiled::{Compiled, Role};
+use super::model::{KnownInput, SystemModel};
+use super::rows::layout::Layout;
 use crate::language::Function;
 
 /// Function of one unknown, as the sine of an angle.

@@ -5,9 +5,14 @@ use obsdeg_exact::{Field, Reals, Scalars, SplitMix64};
 
 use super::addition::written_apart;
 use super::error::ModelError;
-use super::judge::{FieldChoice, Judgement, SystemCertainty, claim_of, judge_compiled, refuse, singular};
-use super::model::{Compiled, SystemModel};
-use super::rows::{Layout, PointRows, SystemRows};
+use super::judge::claim::claim_of;
+use super::judge::point_degrees::{refuse, singular};
+use super::judge::verdicts::{Judgement, SystemCertainty};
+use super::judge::{FieldChoice, judge_compiled};
+use super::model::SystemModel;
+use super::model::compiled::Compiled;
+use super::rows::layout::Layout;
+use super::rows::{PointRows, SystemRows};
 use super::values::Values;
 use super::work::{Spent, Work};
 

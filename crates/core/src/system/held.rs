@@ -6,8 +6,10 @@ use std::collections::BTreeSet;
 use obsdeg_exact::{RowSpace, SplitMix64};
 
 use super::constraints::slots_of;
-use super::model::{Role, StateStart};
-use super::rows::{Point, PointBuilder, Rows, dense};
+use super::model::StateStart;
+use super::model::compiled::Role;
+use super::rows::point::{Point, PointBuilder};
+use super::rows::run::{Rows, dense};
 use super::taylor::{Signal, Singular, Taylor};
 use super::values::Values;
 use super::work::{WorkStep, product};

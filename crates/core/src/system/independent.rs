@@ -22,8 +22,10 @@ use obsdeg_exact::{Echelon, Field, Reals, SplitMix64};
 
 use super::constraints::slots_of;
 use super::dag::Op;
-use super::model::{Compiled, KnownInput, Role, StateStart, SystemModel};
-use super::rows::{Layout, PointBuilder, random_field};
+use super::model::compiled::{Compiled, Role};
+use super::model::{KnownInput, StateStart, SystemModel};
+use super::rows::layout::Layout;
+use super::rows::point::{PointBuilder, random_field};
 use super::taylor::{Signal, Taylor};
 use super::values::Values;
 use super::work::{Spent, Work, WorkStep};

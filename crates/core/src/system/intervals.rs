@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::constraints::below;
 use super::dag::{Dag, Op};
-use super::model::{Compiled, Role};
+use super::model::compiled::{Compiled, Role};
 use crate::language::Function;
 
 /// Interval of all numbers from `low` to `high`; bounds are rounded outwards.

@@ -7,10 +7,11 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 
+use super::error::FilePlace;
 use super::error::ModelError;
 use super::model::{
-    Constant, FilePlace, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelSegment, Named, PlacedExpression,
-    State, StateStart, SystemModel, check_signs,
+    Constant, KnownInput, MAX_DEGREE, MAX_EXPERIMENTS, ModelSegment, Named, PlacedExpression, State,
+    StateStart, SystemModel, check_signs,
 };
 use crate::language::file_error::{explain_message, json_kind};
 use crate::language::{Names, parse_with};

@@ -8,10 +8,11 @@ use obsdeg_exact::{Field, Scalars};
 
 use super::dag::Op;
 use super::function_factors::ModelFactors;
-use super::judge::Judgement;
-use super::model::{Compiled, KnownInput, Role, SystemModel};
+use super::judge::verdicts::Judgement;
+use super::model::compiled::{Compiled, Role};
+use super::model::{KnownInput, SystemModel};
 use super::quotients::{QuotientPowers, QuotientTerms};
-use super::rows::Unknown;
+use super::rows::layout::Unknown;
 use super::values::Values;
 
 /// Largest number of terms of a polynomial that is formed, and of a function that is returned.

@@ -58,21 +58,25 @@ mod why;
 pub(crate) mod work;
 
 pub use analyze::analyze_system;
-pub use answer::*;
+pub use answer::data::*;
+pub use answer::texts::{invariant_reports, symmetry_reports};
 pub use branches::BranchSide;
 pub use candidates::{CANDIDATE_WORDS, check_cost};
 pub use constraints::ConstraintFactor;
 pub use dag::{Dag, DagError, Op};
+pub use error::FilePlace;
 pub use error::ModelError;
 pub use gathered::{Gathered, OutputRows, gather};
-pub use judge::{ByDigits, Judgement, SystemCertainty, judge, judge_compiled, judge_in_digits};
+pub use judge::verdicts::{ByDigits, Judgement, SystemCertainty};
+pub use judge::{judge, judge_compiled, judge_in_digits};
+pub use model::compiled::{Compiled, CompiledExperiment, CompiledSegment, Role};
 pub use model::{
-    AlgebraicEquation, Candidate, Compiled, CompiledExperiment, CompiledSegment, Constant, ExperimentChanges,
-    FilePlace, KnownInput, ModelSegment, Named, Nominal, PlacedExpression, Role, StartTime, State,
-    StateStart, SystemModel,
+    AlgebraicEquation, Candidate, Constant, ExperimentChanges, KnownInput, ModelSegment, Named, Nominal,
+    PlacedExpression, StartTime, State, StateStart, SystemModel,
 };
 pub use reduced::{Reduced, ReducedError, reduced};
-pub use rows::{Layout, OwnRows, PointRows, Unknown};
+pub use rows::layout::{Layout, Unknown};
+pub use rows::{OwnRows, PointRows};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
 pub use why::explain_system;
 pub use work::WorkLimit;

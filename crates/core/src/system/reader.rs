@@ -6,8 +6,9 @@ use std::ops::Range;
 use serde_spanned::Spanned;
 use toml::Value;
 
+use super::error::FilePlace;
 use super::error::ModelError;
-use super::model::{FilePlace, Named, PlacedExpression};
+use super::model::{Named, PlacedExpression};
 use crate::language::vectors::{Mismatch, stacked};
 use crate::language::{Expression, MAX_ENTRIES, Node, Shape, Shapes, parse_components, parse_equation};
 use crate::model::angle::excerpt;

@@ -13,9 +13,11 @@ use obsdeg_exact::Echelon;
 
 use super::error::ModelError;
 use super::identifiable::{identifiable_functions, terms_of};
-use super::judge::{Judgement, judge, judge_compiled};
+use super::judge::verdicts::Judgement;
+use super::judge::{judge, judge_compiled};
+use super::model::compiled::Role;
 use super::model::{
-    Constant, KnownInput, Named, PlacedExpression, Role, StartTime, State, StateStart, SystemModel,
+    Constant, KnownInput, Named, PlacedExpression, StartTime, State, StateStart, SystemModel,
 };
 use super::model_file;
 use super::quotients::QuotientTerms;

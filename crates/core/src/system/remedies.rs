@@ -4,10 +4,12 @@ use std::cmp::Reverse;
 
 use obsdeg_exact::Reals;
 
-use super::judge::{Judgement, climb_at, judge_beside};
-use super::model::{
-    Compiled, Constant, FilePlace, KnownInput, Named, PlacedExpression, Role, StateStart, SystemModel,
-};
+use super::error::FilePlace;
+use super::judge::judge_beside;
+use super::judge::point_degrees::climb_at;
+use super::judge::verdicts::Judgement;
+use super::model::compiled::{Compiled, Role};
+use super::model::{Constant, KnownInput, Named, PlacedExpression, StateStart, SystemModel};
 use super::values::Values;
 use super::work::{Spent, product};
 use crate::language::{Expression, Node};

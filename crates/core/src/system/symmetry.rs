@@ -5,8 +5,10 @@ use obsdeg_exact::{Reals, RowSpace, SplitMix64};
 
 use super::error::ModelError;
 use super::functions::gcd;
-use super::judge::{Judgement, PointDegrees, climb_at};
-use super::model::{Compiled, Role, SystemModel};
+use super::judge::point_degrees::{PointDegrees, climb_at};
+use super::judge::verdicts::Judgement;
+use super::model::SystemModel;
+use super::model::compiled::{Compiled, Role};
 use super::values::Values;
 use super::work::{Spent, WorkLimit, product};
 use crate::degree::sparse::{extend_by_short_vectors, products_of_short_vectors, support_in};

@@ -11,8 +11,8 @@ use obsdeg_exact::{Field, SplitMix64};
 
 use super::constraints::below;
 use super::dag::{Dag, Op};
-use super::model::{Compiled, Role};
-use super::rows::{Layout, Unknown};
+use super::model::compiled::{Compiled, Role};
+use super::rows::layout::{Layout, Unknown};
 use super::values::Values;
 
 /// Largest number of slots of unknowns among which exchanges of two and of three pairs are tried.
@@ -218,7 +218,7 @@ impl TestPoint {
             (None, None) => true,
             _ => false,
         };
-        let jumps = |segment: &super::model::CompiledSegment| {
+        let jumps = |segment: &super::model::compiled::CompiledSegment| {
             let of = |s: usize| segment.carry.iter().find(|c| c.0 == s).map(|c| c.1);
             (0..compiled.starts.len()).all(|s| match (of(s), of(state(s))) {
                 (Some(a), Some(b)) => same(a, b),

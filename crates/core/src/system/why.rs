@@ -2,11 +2,13 @@
 
 use obsdeg_exact::{RowSpace, Scalars};
 
-use super::answer::{SystemAnalysis, SystemOptions};
+use super::answer::data::{SystemAnalysis, SystemOptions};
 use super::error::ModelError;
 use super::gathered::{RunOutputRows, gather_runs};
-use super::judge::{Judgement, judge_beside, judge_compiled};
-use super::model::{Compiled, Constant, KnownInput, StateStart, SystemModel};
+use super::judge::verdicts::Judgement;
+use super::judge::{judge_beside, judge_compiled};
+use super::model::compiled::Compiled;
+use super::model::{Constant, KnownInput, StateStart, SystemModel};
 use super::remedies::improvements;
 use super::rows::PointRows;
 use super::values::Values;

@@ -32,7 +32,7 @@ use obsdeg_exact::parallel;
 
 use crate::prediction::Prediction;
 use crate::simulation::batch::{batch, each_row};
-use crate::simulation::plan::SegmentKind;
+use crate::simulation::plan::timeline::SegmentKind;
 use crate::simulation::record::{RunStart, largest_psi};
 use crate::simulation::{
     Conditions, GyroNoise, Plan, SimulationError, Validity, conditions_report, timeline_report,

@@ -323,7 +323,7 @@ fn filter_prior(
 mod tests {
     use obsdeg_core::model::scheme_file;
 
-    use super::super::plan::{PlanSegment, SegmentKind, left_out};
+    use super::super::plan::timeline::{PlanSegment, SegmentKind, left_out};
     use super::*;
 
     /// Samples that are left out count as samples of a noise a million times larger do, also for the bench:

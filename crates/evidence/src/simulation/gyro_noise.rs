@@ -16,7 +16,8 @@ use obsdeg_ekf::noise::discretised;
 use super::biases::{Bias, NoiseStep, Sensor, root};
 use super::error::SimulationError;
 use super::noise::Noise;
-use super::plan::{Plan, SegmentKind};
+use super::plan::Plan;
+use super::plan::timeline::SegmentKind;
 
 impl Plan {
     /// Input axis of a gyro in platform axes.

@@ -43,12 +43,15 @@ pub use conditions::{
 pub use consistency::{Consistency, Doubt};
 pub use datasheet::GyroNoise;
 pub use error::SimulationError;
-pub use extended::{ExtendedFilter, FilterResult, PlatformMotion, Tilt};
+pub use extended::motion::{PlatformMotion, Tilt};
+pub use extended::{ExtendedFilter, FilterResult};
 pub use floor::{CoefficientFloor, NoiseFloor, Reached, noise_floor, sigmas_without_prior};
 pub use iterated::iterated;
 pub use known::KnownCovariance;
 pub use noise::Noise;
-pub use plan::{Plan, PlanSegment, PlatformProcess, SegmentKind, left_out, steps};
+pub use plan::Plan;
+pub use plan::process::PlatformProcess;
+pub use plan::timeline::{PlanSegment, SegmentKind, left_out, steps};
 pub use record::{RunRecord, Series, Traces, run};
 pub use reports::{conditions_report, timeline_report};
 pub use seen::{no_prior, predict, predict_run};

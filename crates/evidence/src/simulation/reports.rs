@@ -5,7 +5,8 @@ use obsdeg_core::model::settings::{Assignment, DriftNoise, concerns};
 
 use super::answer::{AccelerometerBias, ConditionsReport, TimelineReport, chosen};
 use super::conditions::Conditions;
-use super::plan::{Plan, SegmentKind};
+use super::plan::Plan;
+use super::plan::timeline::SegmentKind;
 
 /// Conditions of a run, as reported.
 pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {

@@ -3,7 +3,8 @@
 use obsdeg_ekf::{EkfError, Measurement, Motion, ScalarOutput, Stage};
 use obsdeg_exact::interrupt;
 
-use super::extended::{ExtendedFilter, PlatformMotion};
+use super::extended::ExtendedFilter;
+use super::extended::motion::PlatformMotion;
 use super::state::PlatformState;
 
 /// Run without noise.

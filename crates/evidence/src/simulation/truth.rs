@@ -10,7 +10,9 @@ use super::error::SimulationError;
 use super::gyro_noise::Gyros;
 use super::limits::MAX_INTEGRATION;
 pub(crate) use super::noise::Noise;
-use super::plan::{G_N, Plan, SegmentKind, integration_steps};
+use super::plan::Plan;
+use super::plan::process::G_N;
+use super::plan::timeline::{SegmentKind, integration_steps};
 use super::state::orthonormal;
 
 /// Bound on the angle, in rad, between true and computed platform after `dt` at a drift of `drifts` rad/s; g

@@ -8,7 +8,7 @@ use obsdeg_design::review::{ModelReview, SchemeReview};
 use obsdeg_evidence::compare::ComparedScheme;
 use obsdeg_evidence::requirements::Miss;
 
-use super::fewest_of_all;
+use super::sensitivity::fewest_of_all;
 use crate::calibration_findings::{durations, is_clock};
 use crate::document::number;
 use crate::simulation::NOT_TRUSTED;
@@ -253,7 +253,7 @@ pub(super) fn of_calibration(c: &Calibration) -> Vec<String> {
     out.extend(undetermined(c));
     out.extend(missed_requirements(c));
     let met = c.requirements.as_ref().is_some_and(|r| !r.with_bench && r.all_met());
-    let limits = if met && c.consistent { omitted::main_limits(c) } else { String::new() };
+    let limits = if met && c.consistent { omitted::calibration::main_limits(c) } else { String::new() };
     if !limits.is_empty() {
         out.push(format!(
             "State the bench: without it errors outside the model count as zero, and the requirements are met \
@@ -404,7 +404,7 @@ fn of_finding(c: &Calibration, f: &CalibrationFinding) -> String {
         CalibrationFinding::Suspect { errors, .. } => format!(
             "Estimate the error that the residuals show, or repair the bench: {} ({}).",
             errors.join(" and "),
-            omitted::estimated_by(errors)
+            omitted::calibration::estimated_by(errors)
         ),
         CalibrationFinding::Known { .. } => {
             "Calibrate without the earlier calibration: it does not agree with these records.".into()

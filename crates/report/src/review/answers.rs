@@ -67,7 +67,7 @@ pub(super) fn of_scheme(s: &SchemeReview, review: &ComparedScheme, certified: bo
     Answers {
         name: s.name.clone(),
         rows: vec![
-            ("Carry", words::carry(s.analysis.carry).into()),
+            ("Carry", words::assumptions::carry(s.analysis.carry).into()),
             ("Assumed", assumed(s, review).into()),
             ("Chosen by the program", chosen(s, review).into()),
             ("What limits it", limits(s, review)),
@@ -89,8 +89,12 @@ fn assumed(s: &SchemeReview, review: &ComparedScheme) -> String {
     let dwells = || s.positions.iter().map(|p| p.dwell_s);
     let (least, most) = dwells().fold((f64::MAX, f64::MIN), |(l, h), t| (l.min(t), h.max(t)));
     let dwell = match least == most {
-        true => format!("dwell {} s per position", super::seconds(most)),
-        false => format!("dwell {} to {} s per position", super::seconds(least), super::seconds(most)),
+        true => format!("dwell {} s per position", super::sections::seconds(most)),
+        false => format!(
+            "dwell {} to {} s per position",
+            super::sections::seconds(least),
+            super::sections::seconds(most)
+        ),
     };
     let mut out = vec![
         format!("noise of Z {:e} g per sample and axis{azimuth}", m.accelerometer_noise_g),
@@ -98,19 +102,18 @@ fn assumed(s: &SchemeReview, review: &ComparedScheme) -> String {
         dwell,
         format!("latitude {} deg", m.latitude_deg),
     ];
-    out.extend(m.settle_s.map(words::settle));
+    out.extend(m.settle_s.map(words::run::settle));
     out.extend(m.slew_rate_deg_s.map(|r| format!("turns at {r} deg/s, without samples")));
-    out.extend(m.accelerometer_bias.as_ref().map(words::accelerometer_bias));
+    out.extend(m.accelerometer_bias.as_ref().map(words::run::accelerometer_bias));
     out.extend(m.drift_noise.as_ref().map(|noise| format!("random drift {noise}")));
-    out.extend(m.gyro_noise.as_ref().map(words::gyro_noise));
+    out.extend(m.gyro_noise.as_ref().map(words::run::gyro_noise));
     out.push(
         m.prior.as_ref().map_or_else(|| "no prior".into(), |p| format!("prior {p} (units of the file)")),
     );
-    out.push(
-        m.bench
-            .as_deref()
-            .map_or_else(|| "no bench (errors outside the model count as zero)".into(), words::bench),
-    );
+    out.push(m.bench.as_deref().map_or_else(
+        || "no bench (errors outside the model count as zero)".into(),
+        words::assumptions::bench,
+    ));
     out.join("; ")
 }
 
@@ -186,10 +189,18 @@ fn duration(s: &SchemeReview, review: &ComparedScheme) -> String {
     let dwells: f64 = s.positions.iter().map(|p| p.dwell_s).sum();
     let n = s.positions.len();
     let turns = match slews > 0.0 {
-        true => format!("; {} s at rest, {} s of turns", super::seconds(dwells), super::seconds(slews)),
+        true => format!(
+            "; {} s at rest, {} s of turns",
+            super::sections::seconds(dwells),
+            super::sections::seconds(slews)
+        ),
         false => "; turns count as instantaneous".into(),
     };
-    format!("{}, {n} position{}{turns}", super::duration(review.total_s), if n == 1 { "" } else { "s" })
+    format!(
+        "{}, {n} position{}{turns}",
+        super::sections::duration(review.total_s),
+        if n == 1 { "" } else { "s" }
+    )
 }
 
 /// Certainty of the exact verdicts, and the figures that no proof covers.

@@ -88,16 +88,16 @@ pub(crate) fn pictures(c: &Calibration, id: &str) -> Pictures {
 pub(crate) fn answers(name: &str, c: &Calibration) -> Answers {
     let of = |r: &RecordReport| {
         let (from, to) = r.span_s;
-        format!("{}: {}, {} samples", file_name(&r.name), super::duration(to - from), r.samples)
+        format!("{}: {}, {} samples", file_name(&r.name), super::sections::duration(to - from), r.samples)
     };
     Answers {
         name: name.into(),
         rows: vec![
-            ("Carry", words::carry(c.setup.carry).into()),
+            ("Carry", words::assumptions::carry(c.setup.carry).into()),
             ("Assumed", assumed_in_brief(c).into()),
             ("Chosen by the program", chosen(c).into()),
             ("What limits it", limits(c)),
-            ("Accelerometers off by 20 ug", omitted::accelerometers_off_in_record(c).into()),
+            ("Accelerometers off by 20 ug", omitted::calibration::accelerometers_off_in_record(c).into()),
             ("Duration", c.records.iter().map(of).collect::<Vec<_>>().join("; ").into()),
             ("Position to drop", position_to_drop(c).into()),
             ("Proven by", PROVEN.into()),

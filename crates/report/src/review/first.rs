@@ -8,7 +8,7 @@ use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
-use super::{duration, joined};
+use super::sections::{duration, joined};
 use crate::compare::{deciding, unknowns};
 use crate::document::{DocumentBlock, Grade, StatusBox, StatusRow, TableCell, left, number};
 use crate::rows::{Chart, ChartRow};

@@ -4,7 +4,8 @@ use obsdeg_core::degree::Status;
 use obsdeg_design::review::GenericReview;
 
 use super::answers::Answers;
-use super::{derivatives, pictures, section};
+use super::pictures;
+use super::sections::{derivatives, section};
 use crate::document::{DocumentBlock, Grade, StatusBox, StatusRow, TableCell};
 use crate::{Answer, words};
 
@@ -71,7 +72,7 @@ pub(super) fn answers(g: &GenericReview) -> Answers {
     Answers {
         name: g.name.clone(),
         rows: vec![
-            ("Carry", words::carry(a.carry).into()),
+            ("Carry", words::assumptions::carry(a.carry).into()),
             ("Assumed", format!("Almost {} at {} positions; {latitude}", any(g), a.positions.len()).into()),
             ("Chosen by the program", "Nothing".into()),
             ("What limits it", limits),

@@ -7,7 +7,9 @@ use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
 use super::answers::{self, Answers};
-use super::{ERRORS, derivatives, is_list, pictures, section};
+use super::evidence::ERRORS;
+use super::pictures;
+use super::sections::{derivatives, is_list, section};
 use crate::document::{DocumentBlock, Grade, StatusBox, StatusRow, TableCell, number};
 use crate::{Answer, stated, system, words};
 
@@ -87,7 +89,7 @@ fn credible(m: &ModelReview) -> (Grade, String) {
     match m.run.as_ref().map(|r| &r.0.consistency) {
         None => (Grade::Open, "not run".into()),
         Some(c) if c.consistent => (Grade::Good, "consistent with its truth".into()),
-        Some(c) => (Grade::Limited, format!("NOT consistent with its truth: {}", words::doubts(c))),
+        Some(c) => (Grade::Limited, format!("NOT consistent with its truth: {}", words::run::doubts(c))),
     }
 }
 

@@ -120,8 +120,11 @@ pub(super) fn attitudes(s: &SchemeReview, name: &str) -> DocumentBlock {
         y_range: Some((-1.15, 1.15)),
         ..Figure::default()
     };
-    let starts: Vec<String> =
-        s.positions.iter().map(|p| format!("{} from {} s", p.name, super::seconds(p.start_s))).collect();
+    let starts: Vec<String> = s
+        .positions
+        .iter()
+        .map(|p| format!("{} from {} s", p.name, super::sections::seconds(p.start_s)))
+        .collect();
     curves(
         name,
         format!("Attitude over time, as gravity along the platform axes: {}", starts.join(", ")),

@@ -5,7 +5,7 @@ use obsdeg_design::review::SchemeReview;
 use obsdeg_evidence::compare::{ComparedScheme, Quantity};
 use obsdeg_evidence::simulation::Outcome;
 
-use super::{derivatives, duration, joined};
+use super::sections::{derivatives, duration, joined};
 use crate::document::{Grade, StatusBox, StatusRow, number};
 use crate::{gimbals, omitted, stated, words};
 
@@ -65,7 +65,7 @@ pub(super) fn evidence(s: &SchemeReview) -> (Grade, String) {
             };
             (Grade::Limited, what)
         }
-        Err(e) => (Grade::Open, format!("not taken: {}", words::no_evidence(e))),
+        Err(e) => (Grade::Open, format!("not taken: {}", words::run::no_evidence(e))),
     }
 }
 
@@ -78,7 +78,7 @@ pub(super) fn limits(s: &SchemeReview) -> Vec<String> {
     if !s.simulation.consistency.consistent {
         out.push(format!(
             "the run of the filter is NOT consistent with its truth ({})",
-            words::doubts(&s.simulation.consistency)
+            words::run::doubts(&s.simulation.consistency)
         ));
     } else if !s.simulation.filter.trusted {
         out.push("the sigmas of the filter are not to be trusted at these drifts".into());
@@ -300,6 +300,6 @@ fn one_run(s: &SchemeReview) -> String {
         (true, false) => "consistent with its truth, which says little: its sigmas are not to be trusted at \
                           these drifts"
             .into(),
-        (false, _) => format!("NOT consistent with its truth: {}", words::doubts(consistency)),
+        (false, _) => format!("NOT consistent with its truth: {}", words::run::doubts(consistency)),
     }
 }

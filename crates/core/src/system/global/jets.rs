@@ -5,8 +5,9 @@ use obsdeg_exact::groebner::{OverLimit, RemainingWork};
 use obsdeg_exact::{Echelon, Field, SplitMix64};
 
 use super::super::dag::Op;
-use super::super::model::{Compiled, KnownInput, Role, SystemModel};
-use super::super::rows::Layout;
+use super::super::model::compiled::{Compiled, Role};
+use super::super::model::{KnownInput, SystemModel};
+use super::super::rows::layout::Layout;
 use super::super::taylor::{Initial, Signal, Taylor};
 use super::super::work;
 

@@ -22,8 +22,9 @@ use obsdeg_exact::groebner::{GroebnerBasis, OverLimit, RemainingWork};
 use obsdeg_exact::multivariate::Polynomial;
 use obsdeg_exact::{Echelon, Field, SplitMix64, polynomial};
 
-use super::judge::Judgement;
-use super::model::{Compiled, StateStart, SystemModel};
+use super::judge::verdicts::Judgement;
+use super::model::compiled::Compiled;
+use super::model::{StateStart, SystemModel};
 use integrals::relations_along;
 use jets::JetSource;
 use ratios::{CoefficientRatio, Pool, ratios};

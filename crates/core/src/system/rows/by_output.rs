@@ -7,11 +7,15 @@
 
 use obsdeg_exact::{RankMargin, RowSpace, Scalars, SplitMix64};
 
-use super::super::model::{Compiled, SystemModel};
+use super::super::model::SystemModel;
+use super::super::model::compiled::Compiled;
 use super::super::taylor::Singular;
 use super::super::values::Values;
 use super::super::work::{Work, WorkStep, product};
-use super::{AdditionalRuns, Layout, PointBuilder, SystemRows, cost_of, rows_of};
+use super::layout::Layout;
+use super::point::PointBuilder;
+use super::run::{cost_of, rows_of};
+use super::{AdditionalRuns, SystemRows};
 
 /// Rows of an output: order, and differential of a derivative by the unknowns.
 pub type OwnRows<S> = Vec<(usize, Vec<<S as Scalars>::Element>)>;

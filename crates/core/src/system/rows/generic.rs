@@ -3,11 +3,12 @@
 use obsdeg_exact::{RankMargin, RowSpace, SplitMix64};
 
 use super::super::adjoint::Adjoint;
-use super::super::model::Role;
+use super::super::model::compiled::Role;
 use super::super::taylor::{Signal, Singular, Taylor};
 use super::super::values::Values;
 use super::super::work::{WorkStep, product};
-use super::{Point, PointBuilder, Rows, cost_of, rows_of};
+use super::point::{Point, PointBuilder};
+use super::run::{Rows, cost_of, rows_of};
 
 /// Spans of the rows of a run at a generic point, one per group of outputs.
 struct GenericSpans<S: Values> {
