@@ -25,7 +25,7 @@ struct Page {
 /// obsdeg-web`, minutes of compilation for another target), else a draft, whose engine is the program that
 /// writes it.
 fn page() -> Page {
-    // with the features of the whole workspace and its tests (an example has them), so that nothing is compiled again
+    // with the features of the whole workspace and of tests (an example has them): nothing is compiled again
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let built = Command::new(cargo)
         .args(["build", "-q", "--workspace", "--bin", "workbench", "--example", "verdicts"])
