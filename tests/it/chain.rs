@@ -177,7 +177,7 @@ fn holds(seed: u64, with_report: bool) {
 
 #[test]
 fn what_design_says_every_command_repeats() {
-    (1..=4).for_each(|seed| holds(seed, seed == 1));
+    (1..=2).for_each(|seed| holds(seed, seed == 1));
 }
 
 /// All commands on 200 tasks: some minutes.
