@@ -111,11 +111,11 @@ fn errors_stay_until_they_are_mended() {
         write(b, &format!("#{field}"), "zz");
         wait(b, field, &wrong(field, "zz"));
         click(b, action);
-        wait(b, "the new position's", "!document.querySelector('.wrong')");
+        wait(b, &format!("after {action} with {field}"), "!document.querySelector('.wrong')");
         assert_ne!(b.value(&format!("document.getElementById({field:?}).value")), json!("zz"));
         click(b, "#undo");
         // buttons that are about to be drawn anew take no click
-        wait(b, "judged again", "!document.querySelector('.wrong, .stale')");
+        wait(b, "judged again", "!document.querySelector('.wrong, #verdicts.stale, #remedies.stale')");
     }
     write(b, "#slew-rate", "2");
     wait(b, "slews", &wrong("slew-rate", "expected inertial"));

@@ -1,5 +1,5 @@
-//! Draft of the page: its engine is this program, compiled in seconds where WebAssembly takes minutes. The page
-//! asks it over a socket of this machine.
+//! Draft of the page: its engine is this program, compiled in seconds where WebAssembly takes minutes. The
+//! page asks it over a socket of this machine.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, Read, Write};
