@@ -24,7 +24,7 @@ struct Untaken {
 }
 
 /// A command at work.
-struct Work {
+struct RunningCommand {
     /// Progress of the command, then its answer.
     receiver: Receiver<Value>,
     untaken: Arc<Mutex<Untaken>>,
@@ -36,7 +36,7 @@ struct Works {
     /// Number of commands that were begun.
     begun: u64,
     /// Each by its number.
-    works: BTreeMap<u64, Work>,
+    works: BTreeMap<u64, RunningCommand>,
 }
 
 fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -101,7 +101,7 @@ fn begin(command: String, request: String, works: &Mutex<Works>) -> Value {
         let mut works = lock(works);
         works.begun += 1;
         let number = works.begun;
-        works.works.insert(number, Work { receiver, untaken: Arc::clone(&untaken) });
+        works.works.insert(number, RunningCommand { receiver, untaken: Arc::clone(&untaken) });
         number
     };
     thread::spawn(move || {
