@@ -234,7 +234,7 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     max_turn: Real
     """With ``minimum`` and torquer errors: the largest turn from one position to the next, in degrees [default: 90]."""
     keep: int
-    """How many schemes are listed [default: 10]."""
+    """Number of listed schemes [default: 10]."""
     restarts: int
     """Restarts of the exchange [default: 200]."""
     within: Real
@@ -257,7 +257,7 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     """Only schemes that are immune to errors that they do not estimate: without effect, ``"K0"``, or shown at 3 sigma
     from a size on, ``{"K0": 20}``."""
     criterion: Literal["worst", "a", "d", "e", "margin"]
-    """What makes one scheme better: the largest sigma, trace, determinant, largest eigenvalue, or the largest sigma over its requirement."""
+    """Criterion by which a scheme is better: the largest sigma, trace, determinant, largest eigenvalue, or the largest sigma over its requirement."""
     meet: bool
     """Only schemes that meet every stated requirement."""
     max_time: Real

@@ -65,8 +65,8 @@ pub struct Search {
     #[arg(long)]
     pub minimum: bool,
 
-    /// What to choose from, or a scheme file: its positions; without SCHEME with carry, latitude, geometry,
-    /// terms, conditions and gimbal limits of the file
+    /// Candidates to choose from, or a scheme file: its positions; without SCHEME with carry, latitude,
+    /// geometry, terms, conditions and gimbal limits of the file
     #[arg(long, value_name = "WHAT", default_value = CARDINAL, value_parser = WordOr(CANDIDATES))]
     pub candidates: String,
 
@@ -91,7 +91,7 @@ pub struct Search {
     #[arg(long, value_name = "DEG", value_parser = within(TURN_DEG))]
     pub max_turn: Option<f64>,
 
-    /// How many schemes, or sets of outputs, are listed (default: 10)
+    /// Number of schemes, or of sets of outputs, that are listed (default: 10)
     #[arg(long, value_name = "N", value_parser = whole::<u16>(KEPT))]
     pub keep: Option<u16>,
 
@@ -184,8 +184,8 @@ pub struct WantedOptions {
     #[serde(with = "text::list")]
     pub immune: Vec<Immune>,
 
-    /// What makes one scheme better; a smaller worst degree comes before it. psi is estimated with the
-    /// coefficients but counts in margin and --meet only (default: worst)
+    /// Criterion by which a scheme is better; a smaller worst degree comes before it. psi is estimated with
+    /// the coefficients but counts in margin and --meet only (default: worst)
     #[arg(long, value_name = "HOW", value_parser = one_of(CRITERIA))]
     pub criterion: Option<CriterionName>,
 
@@ -206,10 +206,10 @@ pub struct WantedOptions {
     #[arg(long, value_name = "DEG_S", value_parser = within(SLEW_RATE_DEG_S))]
     pub slew_rate: Option<f64>,
 
-    /// How far a gimbal turns in degrees, as alpha=-90:90, beta=-80:80. alpha is the outer gimbal, about
-    /// North, beta the middle one, gamma the inner one, about Z_p. Attitudes beyond are left out; the others
-    /// are printed, written and drawn with angles within the limits, those with the shortest gimbal way from
-    /// the position before
+    /// Range of the angle of a gimbal in degrees, as alpha=-90:90, beta=-80:80. alpha is the outer gimbal,
+    /// about North, beta the middle one, gamma the inner one, about Z_p. Attitudes beyond are left out; the
+    /// others are printed, written and drawn with angles within the limits, those with the shortest gimbal
+    /// way from the position before
     #[arg(long, value_name = "ANGLE=LOW:HIGH", allow_hyphen_values = true)]
     pub gimbal: Vec<String>,
 }
