@@ -19,6 +19,8 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 #: Folder of the checkout.
 ROOT = Path(__file__).resolve().parents[2]
+#: What mypy found of the libraries, which one run reads and the next one uses: `cache_dir` in pyproject.toml.
+MYPY_CACHE = ROOT / "target" / "mypy"
 
 try:
     import obsdeg.importers  # noqa: F401

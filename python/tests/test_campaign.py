@@ -96,9 +96,9 @@ def test_parts_are_the_whole(tmp_path: Path) -> None:
 DRIVER = """
 import sys, obsdeg
 from obsdeg import campaign
-tasks = campaign.grid(angles=[[(a, 0, 0), (180, b, 0)] for a in range(0, 60, 5) for b in range(0, 60, 5)], latitude=range(0, 90, 10))
+tasks = campaign.grid(angles=[[(a, 0, 0), (180, b, 0)] for a in range(0, 60, 10) for b in range(0, 60, 10)], latitude=range(0, 90, 20))
 if __name__ == "__main__":
-    campaign.sweep(sys.argv[1], tasks, chunk=40, heard=lambda n: print(n, flush=True))
+    campaign.sweep(sys.argv[1], tasks, chunk=6, heard=lambda n: print(n, flush=True))
 """
 
 
@@ -112,14 +112,14 @@ def test_a_driver_that_was_killed_goes_on(tmp_path: Path) -> None:
     os.killpg(first.pid, signal.SIGKILL)
     first.wait()
     there = {f: f.stat().st_mtime_ns for f in folder.glob("*.parquet")}
-    assert 0 < len(there) < 33
+    assert 0 < len(there) < 30
     subprocess.run([sys.executable, str(script), str(folder)], check=True, stdout=subprocess.DEVNULL, timeout=300)
     files = set(folder.glob("*.parquet"))
-    assert len(files) == 33 and all(f.stat().st_mtime_ns == t for f, t in there.items())
+    assert len(files) == 30 and all(f.stat().st_mtime_ns == t for f, t in there.items())
     rows = pandas.read_parquet(sorted(files))
-    assert len(rows) == 144 * 9 * 15
+    assert len(rows) == 36 * 5 * 15
     # against single answers of the program
-    for angles, latitude in [("[(0, 0, 0), (180, 0, 0)]", "0"), ("[(35, 0, 0), (180, 50, 0)]", "40")]:
+    for angles, latitude in [("[(0, 0, 0), (180, 0, 0)]", "0"), ("[(30, 0, 0), (180, 50, 0)]", "40")]:
         own = obsdeg.analyze(angles=eval(angles), latitude=latitude, solutions=False)  # noqa: S307
         mine = rows[(rows["angles"] == angles) & (rows["latitude"] == latitude)]
         assert dict(zip(mine["name"], mine["status"], strict=True)) == own.statuses

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT
+from conftest import MYPY_CACHE, ROOT
 
 nbformat = pytest.importorskip("nbformat")
 nbclient = pytest.importorskip("nbclient")
@@ -66,7 +66,7 @@ def test_its_code_has_types(tmp_path: Path) -> None:
     script = tmp_path / "walk_through.py"
     script.write_text("\n".join(cells) + "\n")
     done = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", str(tmp_path), str(script)],
+        [sys.executable, "-m", "mypy", "--strict", "--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", str(MYPY_CACHE), str(script)],
         cwd=ROOT,
         capture_output=True,
         text=True,
