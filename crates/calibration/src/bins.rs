@@ -52,7 +52,7 @@ pub struct Spike {
 }
 
 /// Largest number of channels: three components of Z and an azimuth.
-pub const CHANNELS: usize = 4;
+pub(crate) const CHANNELS: usize = 4;
 
 /// Sample: its line, time and channels, and their standard deviations where the record gives them.
 #[derive(Debug, Clone, Copy, PartialEq)]

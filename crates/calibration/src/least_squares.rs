@@ -250,7 +250,7 @@ impl StartInformation {
     }
 
     /// Sum of squares of a run that starts as the trajectory does; the noise of its steps is free.
-    pub fn at_zero(&self) -> f64 {
+    pub(crate) fn at_zero(&self) -> f64 {
         self.left + self.right.norm_squared()
     }
 
@@ -353,7 +353,7 @@ impl LeastSquaresSolution {
 
     /// Covariance of two functionals if the errors of the rows are `factor` times as large as assumed, except
     /// for the rows `known` (any x n): `a^T C (f^2 (C^-1 - K^T K) + K^T K) C b`.
-    pub fn covariance_with(
+    pub(crate) fn covariance_with(
         &self,
         a: &[(usize, f64)],
         b: &[(usize, f64)],

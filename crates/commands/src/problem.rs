@@ -85,7 +85,7 @@ impl Problem {
 
     /// The problem with the name of its scheme before the message.
     #[must_use]
-    pub fn in_file(mut self, name: &str) -> Self {
+    pub(crate) fn in_file(mut self, name: &str) -> Self {
         self.message = format!("{} (in {name})", self.message);
         self
     }

@@ -64,7 +64,7 @@ impl ModelWithText {
     }
 
     /// Problem of an error in a run of the model.
-    pub fn wrong_run(&self, e: &RunError) -> Problem {
+    pub(crate) fn wrong_run(&self, e: &RunError) -> Problem {
         match e {
             RunError::Model(e) => self.wrong(e),
             RunError::Filter { .. } => self.source.wrong(&e.to_string(), None),

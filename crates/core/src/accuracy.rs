@@ -125,7 +125,7 @@ impl Accuracy {
     }
 
     /// The accuracy order of a functional (shape n, in the first field of the verdicts) of a known degree.
-    pub fn of_functional(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
+    pub(crate) fn of_functional(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
         self.module.as_ref().map_or(degree, |m| m.series.order(row))
     }
 
@@ -141,7 +141,7 @@ impl Accuracy {
 
     /// Accuracy order of a functional (shape n, in the first field of the verdicts) of known degree, with
     /// psi taken at the end.
-    pub fn of_functional_at_end(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
+    pub(crate) fn of_functional_at_end(&self, row: &[u64], degree: Option<usize>) -> Option<usize> {
         self.module.as_ref().map_or(degree, |m| m.order_at_end(row))
     }
 }

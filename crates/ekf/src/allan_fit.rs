@@ -19,7 +19,7 @@ use crate::error::EkfError;
 pub const TERMS: usize = 3;
 /// Score above which a noise is resolved: its squared coefficient in standard deviations, as these are
 /// without the noise.
-pub const RESOLVED: f64 = 3.0;
+pub(crate) const RESOLVED: f64 = 3.0;
 /// Probability that an unresolved coefficient lies below its limit.
 pub const LIMIT: f64 = 0.95;
 /// Quantile of the unit normal distribution at [`LIMIT`].

@@ -353,7 +353,7 @@ impl<const N: usize> Ball<N> {
     }
 
     /// `log2` of a bound on the absolute value of every number of the ball.
-    pub fn bound_log2(&self) -> f64 {
+    pub(crate) fn bound_log2(&self) -> f64 {
         let (size, radius) = (self.size_log2(), self.radius_log2());
         match size.max(radius) {
             f64::NEG_INFINITY => f64::NEG_INFINITY,
@@ -394,7 +394,7 @@ impl<const N: usize> Ball<N> {
     }
 
     /// The nearest integer to the midpoint; `None` for a large one.
-    pub fn nearest_integer(&self) -> Option<i64> {
+    pub(crate) fn nearest_integer(&self) -> Option<i64> {
         if self.is_zero() {
             return Some(0);
         }

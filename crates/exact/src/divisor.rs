@@ -80,7 +80,7 @@ impl Algebra {
     }
 
     /// The polynomial with leading coefficient one.
-    pub fn monic(&self, p: &Polynomial) -> Polynomial {
+    pub(crate) fn monic(&self, p: &Polynomial) -> Polynomial {
         lead(p).map_or_else(Polynomial::default, |(_, c)| p.scaled(&self.f, self.f.inv(c)))
     }
 

@@ -126,16 +126,6 @@ impl Radical {
         Some(sum)
     }
 
-    /// The number times an integer, or `None` on overflow.
-    #[must_use]
-    pub fn checked_scale(&self, factor: i64) -> Option<Self> {
-        let mut scaled = *self;
-        for a in &mut scaled.coefficients {
-            *a = Ratio { num: a.num.checked_mul(factor)?, den: a.den }.reduced();
-        }
-        Some(scaled)
-    }
-
     /// The number negated.
     #[must_use]
     pub fn negated(mut self) -> Self {
@@ -275,8 +265,6 @@ mod tests {
     fn sums_are_reduced() {
         let half = Radical::rational(1, 2);
         assert_eq!(half.checked_add(&half), Some(Radical::rational(1, 1)));
-        assert_eq!(Radical::rational(1, 6).checked_scale(-3), Some(Radical::rational(-1, 2)));
-        assert_eq!(Radical::rational(i64::MAX, 1).checked_scale(2), None);
     }
 
     #[test]

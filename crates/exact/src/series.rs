@@ -17,7 +17,7 @@ pub struct SeriesRing {
 }
 
 /// The exponent of the first non-zero coefficient; `None` when all are zero.
-pub fn valuation(a: &[u64]) -> Option<usize> {
+pub(crate) fn valuation(a: &[u64]) -> Option<usize> {
     a.iter().position(|&x| x != 0)
 }
 
@@ -48,7 +48,7 @@ impl SeriesRing {
     }
 
     /// `1/a` of a series with a non-zero constant coefficient.
-    pub fn inverse_of_unit(&self, a: &[u64]) -> Vec<u64> {
+    pub(crate) fn inverse_of_unit(&self, a: &[u64]) -> Vec<u64> {
         let f = &self.field;
         let first = f.inv(a[0]);
         let mut out = vec![0; self.precision];

@@ -30,16 +30,16 @@ use witness::{Filtration, WitnessedVerdict};
 pub const LAYOUT: &str = "obsdeg.certificate/1";
 
 /// Largest number of unknowns of a certificate.
-pub const MOST_UNKNOWNS: usize = 300;
+pub(crate) const MOST_UNKNOWNS: usize = 300;
 
 /// Derivative row: segment (from 1), derivative order, component of Z.
 pub type RowName = (usize, usize, usize);
 
 /// Exact number: a sum of terms `[p, q, r, a, b]`, each `p/q sqrt(r) wN^a wU^b`.
-pub type ExactNumber = Vec<[i64; 5]>;
+pub(crate) type ExactNumber = Vec<[i64; 5]>;
 
 /// Exact vector: the entries that are not 0, by the name of the unknown.
-pub type ExactVector = BTreeMap<String, ExactNumber>;
+pub(crate) type ExactVector = BTreeMap<String, ExactNumber>;
 
 /// Certificate: the verdicts on a scheme and the witness that proves them.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

@@ -29,12 +29,12 @@ pub struct ByPrimes {
 
 impl ByPrimes {
     /// The two primes as text: they exceed the integers that a JSON number holds exactly.
-    pub fn primes_as_text(&self) -> [String; 2] {
+    pub(crate) fn primes_as_text(&self) -> [String; 2] {
         self.primes.map(|p| p.to_string())
     }
 
     /// All primes as text.
-    pub fn all_as_text(&self) -> Vec<String> {
+    pub(crate) fn all_as_text(&self) -> Vec<String> {
         self.primes_as_text().into_iter().chain(self.third.map(|p| p.to_string())).collect()
     }
 }

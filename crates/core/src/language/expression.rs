@@ -10,7 +10,7 @@ use obsdeg_exact::Field;
 /// Deepest nesting of brackets, signs and powers that is accepted.
 pub const MAX_DEPTH: usize = 200;
 /// Largest number of characters of a name.
-pub const MAX_NAME: usize = 256;
+pub(crate) const MAX_NAME: usize = 256;
 
 /// An expression: its operations in order; the last one is its root.
 #[derive(Debug, Clone, PartialEq, Default)]

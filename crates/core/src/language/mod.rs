@@ -6,11 +6,12 @@ pub(crate) mod parser;
 pub(crate) mod vectors;
 
 pub use expression::{
-    Environment, Expression, ExpressionError, Function, MAX_DEPTH, MAX_NAME, Names, Node, constant, evaluate,
+    Environment, Expression, ExpressionError, Function, MAX_DEPTH, Names, Node, constant, evaluate,
     evaluate_f64, from_i128,
 };
-pub(crate) use expression::{among, nearest};
+pub(crate) use expression::{MAX_NAME, among, nearest};
 pub use file_error::explain_message;
-pub use parser::{Components, Shapes, parse, parse_components, parse_equation, parse_with};
-pub(crate) use vectors::component;
-pub use vectors::{MAX_ENTRIES, Shape};
+pub(crate) use parser::parse_equation;
+pub use parser::{Components, Shapes, parse, parse_components, parse_with};
+pub use vectors::Shape;
+pub(crate) use vectors::{MAX_ENTRIES, component};

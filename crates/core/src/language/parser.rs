@@ -416,7 +416,7 @@ pub fn parse_components(text: &str, shapes: &Shapes) -> Result<Components, Expre
 ///
 /// # Errors
 /// [`ExpressionError`] with the place in the text.
-pub fn parse_equation(
+pub(crate) fn parse_equation(
     text: &str,
     shapes: &Shapes,
 ) -> Result<(Components, Option<Expression>), ExpressionError> {

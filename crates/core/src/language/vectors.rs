@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::expression::{Expression, Function, Node};
 
 /// Largest number of entries of a vector or matrix.
-pub const MAX_ENTRIES: usize = 10_000;
+pub(crate) const MAX_ENTRIES: usize = 10_000;
 /// Largest number of operations of an expression with vectors.
 const MAX_OPERATIONS: usize = 200_000;
 
@@ -25,7 +25,7 @@ pub struct Shape {
 
 impl Shape {
     /// Shape of one number.
-    pub const SCALAR: Self = Self { rows: 1, columns: 1 };
+    pub(crate) const SCALAR: Self = Self { rows: 1, columns: 1 };
 
     /// Shape of a column of `n` entries.
     pub const fn vector(n: usize) -> Self {

@@ -12,7 +12,7 @@ pub struct Acceptance {
 }
 
 /// Risk where a scheme states none.
-pub const RISK: f64 = 0.05;
+pub(crate) const RISK: f64 = 0.05;
 /// Admitted risks.
 const RISKS: [f64; 2] = [1e-6, 0.5];
 

@@ -30,7 +30,7 @@ impl ErrorModel {
     /// Degree of the trigonometric polynomials of the turn angle that drifts and accelerometer errors in n
     /// are while the platform turns about one axis: one for `C_c^n`, one for each component that a
     /// coefficient multiplies.
-    pub fn harmonics(&self) -> usize {
+    pub(crate) fn harmonics(&self) -> usize {
         1 + self.terms.iter().map(|t| t.factors.len()).max().unwrap_or(0)
     }
 
@@ -67,7 +67,7 @@ impl ErrorModel {
     }
 
     /// `E(u)` of torquer errors in c, for a rate along `u`: three rows, one column per coefficient.
-    pub fn torquer_columns<R: Ring>(&self, ring: &R, u: &[R::Element; 3]) -> Columns<R::Element> {
+    pub(crate) fn torquer_columns<R: Ring>(&self, ring: &R, u: &[R::Element; 3]) -> Columns<R::Element> {
         self.rows(ring, &unit(ring), |source| (source == ErrorSource::Rate).then_some(u))
     }
 

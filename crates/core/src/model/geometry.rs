@@ -121,7 +121,7 @@ impl Accelerometers {
     }
 
     /// True if the input axes are the platform axes.
-    pub fn is_default(&self) -> bool {
+    pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }
 }

@@ -31,7 +31,7 @@ pub mod slew;
 pub(crate) mod symbols;
 pub(crate) mod terms;
 
-pub use acceptance::{Acceptance, RISK};
+pub use acceptance::Acceptance;
 pub use angle::{Angle, AngleError, format_decimal, parse_decimal};
 pub use attitude::{
     Euler, Matrix3, Turned, angles_text, c_n_f64, cardinal, cardinal_name, cardinal_names, elementary,
@@ -46,7 +46,7 @@ pub use gimbals::{GIMBAL_NAMES, GimbalError, Gimbals, euler_of};
 pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
 pub use observed::{LOCAL, Observed, PSI_EPS};
 pub use omitted::{MAX_ATTITUDES, OmittedEffect, OmittedModel, OmittedTerm};
-pub use omitted_names::{SITE_FAMILIES, may_be_omitted, omitted_meant, omitted_unit};
+pub use omitted_names::{may_be_omitted, omitted_meant, omitted_unit};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};
 pub use platform::{

@@ -5,7 +5,7 @@ use super::terms::Term;
 use crate::language::nearest;
 
 /// Families of errors that are no coefficient, with their units.
-pub const SITE_FAMILIES: [(&str, &str); 5] = [
+pub(crate) const SITE_FAMILIES: [(&str, &str); 5] = [
     ("latitude", "arcsec"),
     ("azimuth", "arcsec"),
     ("earth_rate", "ppm"),

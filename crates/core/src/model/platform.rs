@@ -251,7 +251,7 @@ fn drift_block<R: Ring>(ring: &R) -> PositionBlock<R::Element> {
 impl<R: Ring> PlatformPoint<R> {
     /// Turns to a station, each with the attitude at its start.
     #[expect(clippy::type_complexity, reason = "pairs, which would be no plainer under a name")]
-    pub fn turns_to(&self, i: usize) -> Vec<(Matrix3<R::Element>, &TurnAt<R::Element>)> {
+    pub(crate) fn turns_to(&self, i: usize) -> Vec<(Matrix3<R::Element>, &TurnAt<R::Element>)> {
         let (Some(turns), Some(before)) = (self.turns.get(i), i.checked_sub(1)) else { return Vec::new() };
         let mut from = self.attitudes[before].clone();
         let mut out = Vec::with_capacity(turns.len());
@@ -502,7 +502,7 @@ impl RandomValues {
     }
 
     /// Sample under the embedding `g -> g^a`, at other rates `(wN, wU)` of the earth.
-    pub fn sample_at(&self, scheme: &Scheme, a: u64, [w_n, w_u]: [u64; 2]) -> FieldSample {
+    pub(crate) fn sample_at(&self, scheme: &Scheme, a: u64, [w_n, w_u]: [u64; 2]) -> FieldSample {
         let roots = self.roots.conjugate(a);
         let attitudes = self.attitudes(scheme, &roots);
         let paths = scheme.paths().unwrap_or_default();

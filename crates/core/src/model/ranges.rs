@@ -37,7 +37,7 @@ pub const AZIMUTH_NOISE_DEG: Range = range(1e-12, 1e3, "deg");
 /// Random drift other than zero, in deg/h or deg/sqrt(h).
 pub const DRIFT_NOISE: Range = range(1e-12, 1e6, "");
 /// Noise of a gyro other than zero, in deg/sqrt(h), deg/h/sqrt(h) or deg/h.
-pub const GYRO_NOISE: Range = range(1e-12, 1e6, "");
+pub(crate) const GYRO_NOISE: Range = range(1e-12, 1e6, "");
 /// Correlation time of a bias instability.
 pub const CORRELATION_S: Range = range(1.0, 1e9, "s");
 /// Factor on the true drifts and their priors.
@@ -49,7 +49,7 @@ pub const VALUE: Range = range(-1e6, 1e6, "");
 /// Size (one sigma) of an error that is not estimated, in the unit of the error.
 pub const BENCH: Range = range(0.0, 1e9, "");
 /// Random walk of a coefficient between calibrations, in the unit of the coefficient per sqrt(day).
-pub const AGEING: Range = range(0.0, 1e9, "");
+pub(crate) const AGEING: Range = range(0.0, 1e9, "");
 /// Required standard deviation.
 pub const REQUIREMENT: Range = range(1e-12, 1e9, "");
 

@@ -495,7 +495,7 @@ impl Scheme {
 
     /// True if rotations are judged by the output history during the turn, not at attitudes of the arc: if
     /// not only drifts are unknown.
-    pub fn by_history(&self) -> bool {
+    pub(crate) fn by_history(&self) -> bool {
         self.rotates() && (self.unknowns.have(ErrorSource::Rate) || self.unknowns.have(ErrorSource::Force))
     }
 
@@ -505,7 +505,7 @@ impl Scheme {
     }
 
     /// Error model of the unknown coefficients.
-    pub fn error_model(&self) -> ErrorModel {
+    pub(crate) fn error_model(&self) -> ErrorModel {
         let terms = self.unknowns.terms().iter().flat_map(|t| t.coefficients(&self.geometry));
         terms.map(|(_, effect)| effect).collect::<Vec<_>>().into()
     }

@@ -70,7 +70,7 @@ pub struct Dag {
 
 impl Dag {
     /// True if the graph has no function, so that every value exists in a prime field.
-    pub fn is_rational(&self) -> bool {
+    pub(crate) fn is_rational(&self) -> bool {
         !self.ops.iter().any(|op| matches!(op, Op::Primitive { .. } | Op::Pi))
     }
 

@@ -75,8 +75,8 @@ pub use model::{
     PlacedExpression, StartTime, State, StateStart, SystemModel,
 };
 pub use reduced::{Reduced, ReducedError, reduced};
+pub use rows::PointRows;
 pub use rows::layout::{Layout, Unknown};
-pub use rows::{OwnRows, PointRows};
 pub use symmetry::{Invariant, POLYNOMIAL_DEGREE, PolynomialDirection, Symmetries, Symmetry, symmetries};
 pub use why::explain_system;
 pub use work::WorkLimit;

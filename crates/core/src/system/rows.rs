@@ -19,7 +19,7 @@ use layout::{Layout, Unknown};
 use point::{PointBuilder, SharedValues};
 use run::{EndCondition, RunRows, cost_of, rows_of};
 
-pub use by_output::{OwnRows, PointRows};
+pub use by_output::PointRows;
 
 /// Rows of a system at one random point of one field.
 #[derive(Debug, Clone)]

@@ -29,15 +29,15 @@ pub use observable::slew_sequences::{
 pub use observable::symmetry::CandidateSymmetry;
 pub use request::candidates::Candidates;
 pub use request::error::{DesignError, PartError};
-pub use request::limits::{EXHAUSTIVE, MOST_EXTENSIONS};
+pub(crate) use request::limits::MOST_EXTENSIONS;
 pub use request::options::{CriterionName, DesignOptions, Immune};
 pub use run::driver::design;
 pub use run::merged::design_merged;
 pub use run::optimum::{
-    BestSequence, OPTIMUM_LAYOUT, OptimumCertificate, OptimumProblem, RequiredCoefficient, SequenceBlock,
-    certify_optimum, check_certifiable,
+    BestSequence, OptimumCertificate, OptimumProblem, RequiredCoefficient, SequenceBlock, certify_optimum,
+    check_certifiable,
 };
-pub use run::part::{Block, Level, PART_SCHEMA, Part, design_part, design_starts};
+pub use run::part::{Block, Level, Part, design_part, design_starts};
 pub use run::task::asked;
 pub use run::winner::scheme as scheme_found;
 pub(crate) use run::winner::{half_turn, under};

@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Name and version of the JSON layout.
-pub const NEXT_SCHEMA: &str = "obsdeg.next/1";
+pub(crate) const NEXT_SCHEMA: &str = "obsdeg.next/1";
 
 /// Positions by which a scheme gains most.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

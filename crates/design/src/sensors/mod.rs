@@ -41,7 +41,7 @@ use unique::{UniqueSolutions, is_one};
 use crate::degree_caps::{DegreeCap, widest_first};
 
 /// Largest number of candidates.
-pub const MAX_SENSORS: usize = 64;
+pub(crate) const MAX_SENSORS: usize = 64;
 /// Number of pairs of points that are tried.
 const ATTEMPTS: usize = 5;
 /// Limit of work of all sets together, as a multiple of that of one verdict.

@@ -194,7 +194,7 @@ impl<'a> PreparedExperiment<'a> {
 
     /// True if runs start from the scheme's own truth, with initial estimates drawn about it: for an exact
     /// truth and a filter of its unknowns. Otherwise truths are drawn about the initial estimate.
-    pub fn is_about_the_truth(&self) -> bool {
+    pub(crate) fn is_about_the_truth(&self) -> bool {
         self.experiment.conditions.truth == Truth::Exact && self.comparable()
     }
 

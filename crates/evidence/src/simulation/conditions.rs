@@ -249,7 +249,7 @@ impl Conditions {
 
     /// Sizes of the bench in words, such as `K0 20, latitude 10`, each in the unit of its error, with the
     /// sizes that a family stated later overrides; `None` where none is stated.
-    pub fn bench_in_words(&self) -> Option<String> {
+    pub(crate) fn bench_in_words(&self) -> Option<String> {
         // of two sizes of the same error the later one counts
         let counts = |i: &usize| {
             let own = &self.bench[*i].name;
@@ -290,7 +290,7 @@ impl Conditions {
     }
 
     /// True if the requested filter has full attitudes.
-    pub fn has_full_attitudes(&self) -> bool {
+    pub(crate) fn has_full_attitudes(&self) -> bool {
         self.filter.is_some_and(|filter| filter != FilterKind::Linear)
     }
 
@@ -315,7 +315,7 @@ impl Conditions {
     }
 
     /// Time at the start of a position whose samples are left out, in s; `None` where none is.
-    pub fn stated_settle_s(&self) -> Option<f64> {
+    pub(crate) fn stated_settle_s(&self) -> Option<f64> {
         Some(self.settle_s).filter(|s| *s > 0.0)
     }
 

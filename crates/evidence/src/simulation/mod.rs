@@ -53,8 +53,10 @@ pub use plan::Plan;
 pub use plan::process::PlatformProcess;
 pub use plan::timeline::{PlanSegment, SegmentKind, left_out, steps};
 pub use record::{RunRecord, Series, Traces, run};
-pub use reports::{conditions_report, timeline_report};
-pub use seen::{no_prior, predict, predict_run};
+pub(crate) use reports::{conditions_report, timeline_report};
+#[cfg(test)]
+pub(crate) use seen::no_prior;
+pub use seen::predict;
 pub use sensitivities::{SchemeAnalysis, Sensitivities, sensitivities};
 pub use simulate::simulate;
 pub use start::RunStart;

@@ -9,7 +9,7 @@ use super::plan::Plan;
 use super::plan::timeline::SegmentKind;
 
 /// Conditions of a run, as reported.
-pub fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {
+pub(crate) fn conditions_report(scheme: &Scheme, plan: &Plan, conditions: &Conditions) -> ConditionsReport {
     let noise = conditions.drift_noise;
     let given = matches!(noise, DriftNoise::OneStep(_)).then_some(conditions.drift_noise_step_s);
     // a slew takes as many steps as a position of its duration
@@ -61,7 +61,7 @@ fn chosen_for_run(scheme: &Scheme, unknowns: &[String], conditions: &Conditions)
 }
 
 /// Timeline of a plan, as reported.
-pub fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
+pub(crate) fn timeline_report(plan: &Plan) -> Vec<TimelineReport> {
     let positions = &plan.platform.scheme().positions;
     let mut out: Vec<TimelineReport> = Vec::new();
     for s in &plan.segments {

@@ -83,7 +83,7 @@ fn with_slews(
 ///
 /// # Errors
 /// [`EkfError`] for a number that is not finite.
-pub fn no_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
+pub(crate) fn no_prior(plan: &Plan) -> Result<Vec<f64>, EkfError> {
     if plan.slews().next().is_none() {
         return diffuse_prior(plan);
     }
@@ -106,7 +106,7 @@ pub fn predict(plan: &Plan, seed: u64) -> Result<Prediction, SimulationError> {
 ///
 /// # Errors
 /// [`SimulationError`].
-pub fn predict_run(plan: &Plan, prior: &[f64], seed: u64) -> Result<Prediction, SimulationError> {
+pub(crate) fn predict_run(plan: &Plan, prior: &[f64], seed: u64) -> Result<Prediction, SimulationError> {
     let wide = [1.0, WIDER].map(|w| prior.iter().map(|s| s * w).collect());
     with_slews(plan, seed, MOSTLY, || PriorRoots::of(plan, |_| wide))
 }

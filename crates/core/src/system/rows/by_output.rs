@@ -18,7 +18,7 @@ use super::run::{cost_of, rows_of};
 use super::{AdditionalRuns, SystemRows};
 
 /// Rows of an output: order, and differential of a derivative by the unknowns.
-pub type OwnRows<S> = Vec<(usize, Vec<<S as Scalars>::Element>)>;
+pub(crate) type OwnRows<S> = Vec<(usize, Vec<<S as Scalars>::Element>)>;
 
 /// Rows of all outputs at one random point.
 #[derive(Debug, Clone)]

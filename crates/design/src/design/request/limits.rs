@@ -9,9 +9,9 @@ pub(crate) const MAX_UNKNOWNS: usize = 66;
 /// Number of unknowns, psi and drifts, up to which a search takes smaller arrays.
 pub(crate) const MAX_DRIFTS: usize = 33;
 /// Largest number of sequences, up to symmetry, that are searched exhaustively.
-pub const EXHAUSTIVE: u64 = 50_000_000;
+pub(crate) const EXHAUSTIVE: u64 = 50_000_000;
 /// Most extensions of a scheme that are compared.
-pub const MOST_EXTENSIONS: usize = 20_000;
+pub(crate) const MOST_EXTENSIONS: usize = 20_000;
 /// Number of sequences above which an incumbent is searched first (branch and bound).
 pub(crate) const MANY: u64 = 1_000_000;
 /// Number of sequences, under reset carry, up to which all are searched whatever a bound says.

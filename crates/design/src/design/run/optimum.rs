@@ -21,7 +21,7 @@ use crate::design::search::progress::{NOTHING_YET, Progress, watched};
 use crate::design::search::scoring::SequenceSearch;
 
 /// Name and version of the layout.
-pub const OPTIMUM_LAYOUT: &str = "obsdeg.optimum-certificate/1";
+pub(crate) const OPTIMUM_LAYOUT: &str = "obsdeg.optimum-certificate/1";
 /// Number of sequences behind a start above which starts are made longer.
 const LONG: f64 = 1e6;
 /// Largest number of blocks.

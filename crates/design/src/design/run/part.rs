@@ -19,7 +19,7 @@ use crate::design::search::progress::{NOTHING_YET, Progress, watched};
 use crate::design::search::scoring::SequenceSearch;
 
 /// Name and version of the JSON layout.
-pub const PART_SCHEMA: &str = "obsdeg.part/2";
+pub(crate) const PART_SCHEMA: &str = "obsdeg.part/2";
 /// Largest number of parts of a search.
 pub(crate) const MOST_PARTS: usize = 1_000_000;
 /// Number of starts of a block, which are searched at once: an interrupted part continues after its

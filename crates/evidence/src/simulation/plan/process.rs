@@ -100,7 +100,7 @@ impl Plan {
     }
 
     /// True if torquer errors act in instantaneous turns, which full attitudes do not have.
-    pub fn torqued_at_once(&self) -> bool {
+    pub(crate) fn torqued_at_once(&self) -> bool {
         self.point.turns.iter().any(|turns| !turns.is_empty())
     }
 
