@@ -25,7 +25,7 @@ pub struct Mean {
 
 /// Bin: a few seconds of a record.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bin {
+pub(crate) struct Bin {
     /// Middle of the bin: the mean of its times, in s.
     pub t: f64,
     /// First and last line of the record.
@@ -38,7 +38,7 @@ pub struct Bin {
 
 /// Sample far from the line of its bin.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Spike {
+pub(crate) struct Spike {
     /// Line of the record.
     pub line: u64,
     /// Time, in s.
@@ -56,7 +56,7 @@ pub(crate) const CHANNELS: usize = 4;
 
 /// Sample: its line, time and channels, and their standard deviations where the record gives them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BinSample {
+pub(crate) struct BinSample {
     /// Line of the record.
     pub line: u64,
     /// Time, in s.
@@ -83,7 +83,7 @@ const SOME: usize = 5;
 
 /// Collects samples into bins.
 #[derive(Debug, Clone)]
-pub struct Binner {
+pub(crate) struct Binner {
     length_s: f64,
     /// Standard deviations by channel, for bins whose samples are all equal.
     sigmas: Vec<f64>,
@@ -94,12 +94,12 @@ pub struct Binner {
 
 impl Binner {
     /// Bins of at most `length_s`, for channels with about these standard deviations of a sample.
-    pub fn new(length_s: f64, sigmas: Vec<f64>) -> Self {
+    pub(crate) fn new(length_s: f64, sigmas: Vec<f64>) -> Self {
         Self { length_s, spreads: vec![VecDeque::new(); sigmas.len()], sigmas, now: Vec::new() }
     }
 
     /// Adds a sample; returns the bins that it ends.
-    pub fn push(&mut self, sample: BinSample, spikes: &mut Vec<Spike>) -> Vec<Bin> {
+    pub(crate) fn push(&mut self, sample: BinSample, spikes: &mut Vec<Spike>) -> Vec<Bin> {
         // a small margin, so that samples every 10 s are bins of 10 s
         let ends = self.now.first().is_some_and(|first| {
             sample.sigma.is_some() || sample.t - first.t >= self.length_s * (1.0 - 1e-9)
@@ -111,7 +111,7 @@ impl Binner {
 
     /// Bins of the remaining samples: one, or several where one channel has a single sample among others. No
     /// slope brings that to their middle, so each run of samples with the same channels is a bin then.
-    pub fn end(&mut self, spikes: &mut Vec<Spike>) -> Vec<Bin> {
+    pub(crate) fn end(&mut self, spikes: &mut Vec<Spike>) -> Vec<Bin> {
         let mut now = std::mem::take(&mut self.now);
         let alone = |c: usize| now.len() > 1 && now.iter().filter(|s| s.z[c].is_some()).count() == 1;
         let same =

@@ -72,7 +72,7 @@ struct OfNoise {
 
 /// Information of a run on its start.
 #[derive(Debug, Clone)]
-pub struct StartInformation {
+pub(crate) struct StartInformation {
     /// Root `S` (n x n) of the information on the start.
     pub root: DMatrix<f64>,
     /// Right side of `S d = right`, with d the most probable correction of the trajectory's start.
@@ -84,7 +84,7 @@ pub struct StartInformation {
 
 /// State of a run by all its measurements.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RunState {
+pub(crate) struct RunState {
     /// Correction of the trajectory's state.
     pub correction: DVector<f64>,
     /// Root (n x any) of the error covariance, which is this times its transpose.
@@ -93,7 +93,7 @@ pub struct RunState {
 
 impl RunState {
     /// Standard deviation of a component.
-    pub fn sigma(&self, i: usize) -> f64 {
+    pub(crate) fn sigma(&self, i: usize) -> f64 {
         self.root.row(i).norm()
     }
 }
@@ -222,7 +222,7 @@ impl StartInformation {
     ///
     /// # Errors
     /// [`EkfError::NotFinite`].
-    pub fn of(run: &Linearised) -> Result<Self, EkfError> {
+    pub(crate) fn of(run: &Linearised) -> Result<Self, EkfError> {
         let n = run.states();
         let mut rows = Backward::new(n);
         let mut noise = Vec::with_capacity(run.stages.len());
@@ -258,7 +258,7 @@ impl StartInformation {
     ///
     /// # Errors
     /// [`EkfError::Singular`].
-    pub fn states(&self, run: &Linearised, start: RunState) -> Result<Vec<RunState>, EkfError> {
+    pub(crate) fn states(&self, run: &Linearised, start: RunState) -> Result<Vec<RunState>, EkfError> {
         let mut out = vec![start];
         let mut gaps = run.gaps.iter().peekable();
         for (step, ((stage, g), of)) in run.stages.iter().zip(&run.roots).zip(&self.noise).enumerate() {
@@ -292,7 +292,7 @@ impl StartInformation {
 
 /// Least-squares solution of stacked rows.
 #[derive(Debug, Clone)]
-pub struct LeastSquaresSolution {
+pub(crate) struct LeastSquaresSolution {
     /// Unknowns (shape n).
     pub x: DVector<f64>,
     /// Inverse root of the information (n x any): the covariance is this times its transpose.
@@ -305,18 +305,18 @@ pub struct LeastSquaresSolution {
 
 /// Rows `A x = b` with unit errors, stacked.
 #[derive(Debug, Clone)]
-pub struct StackedRows {
+pub(crate) struct StackedRows {
     all: DMatrix<f64>,
 }
 
 impl StackedRows {
     /// No rows, for n unknowns.
-    pub fn new(n: usize) -> Self {
+    pub(crate) fn new(n: usize) -> Self {
         Self { all: DMatrix::zeros(0, n + 1) }
     }
 
     /// Adds `a` (any x n) and `b`.
-    pub fn add(&mut self, a: &DMatrix<f64>, b: &DVector<f64>) {
+    pub(crate) fn add(&mut self, a: &DMatrix<f64>, b: &DVector<f64>) {
         let (rows, n) = (self.all.nrows(), self.all.ncols() - 1);
         let mut all = self.all.clone().resize_vertically(rows + a.nrows(), 0.0);
         all.view_mut((rows, 0), (a.nrows(), n)).copy_from(a);
@@ -328,7 +328,7 @@ impl StackedRows {
     ///
     /// # Errors
     /// [`EkfError::Singular`] when the rows do not determine all unknowns.
-    pub fn solve(&self) -> Result<LeastSquaresSolution, EkfError> {
+    pub(crate) fn solve(&self) -> Result<LeastSquaresSolution, EkfError> {
         let n = self.all.ncols() - 1;
         let r = triangle(self.all.clone(), n + 1);
         let root = r.view((0, 0), (n, n)).into_owned();
@@ -347,7 +347,7 @@ impl StackedRows {
 
 impl LeastSquaresSolution {
     /// Covariance (n x n).
-    pub fn covariance(&self) -> DMatrix<f64> {
+    pub(crate) fn covariance(&self) -> DMatrix<f64> {
         &self.inverse_root * self.inverse_root.transpose()
     }
 
@@ -374,7 +374,7 @@ impl LeastSquaresSolution {
     }
 
     /// Standard deviation of a functional of the unknowns.
-    pub fn sigma(&self, terms: &[(usize, f64)]) -> f64 {
+    pub(crate) fn sigma(&self, terms: &[(usize, f64)]) -> f64 {
         self.whitened(terms).norm()
     }
 }

@@ -19,7 +19,7 @@ struct WindowSample<S> {
 
 /// Sample with its interval at rest.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DecidedSample<S> {
+pub(crate) struct DecidedSample<S> {
     /// Payload of the sample.
     pub sample: S,
     /// Index of its interval at rest, from 0; `None` in motion.
@@ -28,7 +28,7 @@ pub struct DecidedSample<S> {
 
 /// Detector of intervals at rest; samples come out in the order in which they went in.
 #[derive(Debug, Clone)]
-pub struct Detector<S> {
+pub(crate) struct Detector<S> {
     of: Still,
     /// Samples from the start of the window of the next undecided sample on; those before `next` are decided.
     samples: VecDeque<WindowSample<Option<S>>>,
@@ -53,7 +53,7 @@ pub struct Detector<S> {
 
 impl<S> Detector<S> {
     /// Detector without samples.
-    pub fn new(of: &Still) -> Self {
+    pub(crate) fn new(of: &Still) -> Self {
         Self {
             of: of.clone(),
             samples: VecDeque::new(),
@@ -72,12 +72,12 @@ impl<S> Detector<S> {
     }
 
     /// Number of intervals found.
-    pub fn found(&self) -> usize {
+    pub(crate) fn found(&self) -> usize {
         self.found
     }
 
     /// Adds a sample with the channels `x` that decide; samples that are decided now go to `out`.
-    pub fn push(&mut self, t: f64, x: Vec<f64>, sample: S, out: &mut Vec<DecidedSample<S>>) {
+    pub(crate) fn push(&mut self, t: f64, x: Vec<f64>, sample: S, out: &mut Vec<DecidedSample<S>>) {
         if self.origin.is_empty() {
             self.sums = vec![[0.0; 2]; x.len()];
             self.origin.clone_from(&x);
@@ -91,7 +91,7 @@ impl<S> Detector<S> {
     }
 
     /// Decides the remaining samples at the end of the record.
-    pub fn end(&mut self, out: &mut Vec<DecidedSample<S>>) {
+    pub(crate) fn end(&mut self, out: &mut Vec<DecidedSample<S>>) {
         if self.limit.is_none() {
             self.set_limit();
         }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 pub struct Acceptance {
     /// Lowest and highest value allowed by coefficient or family, in the unit of the coefficient.
     pub limits: BTreeMap<String, [f64; 2]>,
-    /// Largest probability that an accepted coefficient lies outside its limits; `None`: [`RISK`].
+    /// Largest probability that an accepted coefficient lies outside its limits; `None`: 0.05.
     pub risk: Option<f64>,
 }
 

@@ -39,7 +39,7 @@ pub(crate) enum JobError {
 }
 
 /// Answers requests, one per line, as soon as this process holds `lock_file`. Output of the engine
-/// itself to stdout has no [`PREFIX`].
+/// itself to stdout does not begin with `obsdeg:`.
 ///
 /// `end` ends the process. It is called at any point of the work when the input ends, since nobody
 /// waits for an answer then, and when a job has used up its processor time.
