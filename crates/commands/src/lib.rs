@@ -33,6 +33,8 @@ mod procedure;
 mod report;
 mod simulate;
 mod source;
+#[cfg(test)]
+mod tests;
 mod text;
 
 pub use allan::{Allan, allan, files as allan_files};
