@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use clap::builder::styling::AnsiColor;
-use obsdeg_commands::{Kind, Problem, TextPlace};
+use obsdeg_commands::{Problem, ProblemKind, TextPlace};
 use obsdeg_report::{ReportError, in_ascii, visible};
 
 use crate::terminal::plain_messages;
@@ -106,9 +106,9 @@ impl From<Problem> for Failure {
     fn from(e: Problem) -> Self {
         match (e.kind, e.place) {
             (_, Some(place)) => Self::at(&e.message, &place),
-            (Kind::Input, None) => Self::input(e.message),
-            (Kind::Internal, None) => Self::internal(e.message),
-            (Kind::Interrupted, None) => Self::unfinished(e.message),
+            (ProblemKind::Input, None) => Self::input(e.message),
+            (ProblemKind::Internal, None) => Self::internal(e.message),
+            (ProblemKind::Interrupted, None) => Self::unfinished(e.message),
         }
     }
 }

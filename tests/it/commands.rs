@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use obsdeg_commands::{COMMANDS, Host, Kind, call};
+use obsdeg_commands::{COMMANDS, Host, ProblemKind, call};
 use serde_json::{Value, json};
 
 fn root() -> &'static Path {
@@ -209,7 +209,7 @@ fn a_review_is_the_same_page() {
 fn wrong_requests_are_named() {
     let wrong = |command: &str, request: Value| {
         let problem = call(command, &request.to_string(), &mut Host::silent()).err().expect("refused");
-        assert_eq!(problem.kind, Kind::Input);
+        assert_eq!(problem.kind, ProblemKind::Input);
         problem.message
     };
     let said = wrong("analyze", json!({ "angels": ["0,0,0"] }));

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::calibrate::{GRAVITY, number_within};
 use crate::host::Host;
-use crate::problem::{Kind, Problem};
+use crate::problem::{Problem, ProblemKind};
 
 /// Default probability of a confidence band.
 const CONFIDENCE: f64 = 0.95;
@@ -55,7 +55,9 @@ pub fn allan(a: &Allan, record: Record, host: &Host<'_>) -> Result<SensorNoiseRe
         NoiseOptions { columns: a.column.clone(), confidence: a.confidence, gravity_m_s2: a.gravity };
     let progress = |now: CalibrationProgress<'_>| (host.progress)(now.into());
     sensor_noise(record, &options, &progress).map_err(|e| match e {
-        NoiseError::Interrupted => Problem { kind: Kind::Interrupted, ..Problem::input("interrupted") },
+        NoiseError::Interrupted => {
+            Problem { kind: ProblemKind::Interrupted, ..Problem::input("interrupted") }
+        }
         e => Problem::input(e.to_string()),
     })
 }

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use crate::arguments::{ANY, Assumptions, Given, SEED, check_whole, whole};
 use crate::conditions::{GyroNoiseOptions, RequirementOptions, within};
 use crate::host::Host;
-use crate::problem::{Kind, Problem};
+use crate::problem::{Problem, ProblemKind};
 use crate::source::{Input, ModelWithText, NamedInput, Source};
 
 /// Default number of starts.
@@ -339,7 +339,7 @@ fn of_model(
     let found = calibrate_system(&file.model, record, &options, progress).map_err(|e| match e {
         SystemCalibrationError::Model(e) => file.wrong(&e),
         SystemCalibrationError::Interrupted => {
-            Problem { kind: Kind::Interrupted, ..Problem::input("interrupted") }
+            Problem { kind: ProblemKind::Interrupted, ..Problem::input("interrupted") }
         }
         e => Problem::input(e.to_string()),
     })?;

@@ -15,7 +15,7 @@ use serde::Serialize;
 /// Origin of a problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum ProblemKind {
     /// Bad input.
     Input,
     /// Defect of the program.
@@ -55,7 +55,7 @@ impl TextPlace {
 #[error("{message}")]
 pub struct Problem {
     /// Origin of the problem.
-    pub kind: Kind,
+    pub kind: ProblemKind,
     /// Message: place, expected, found.
     pub message: String,
     /// Place of the problem; `None` if it is not in a text.
@@ -65,17 +65,21 @@ pub struct Problem {
 impl Problem {
     /// Bad input.
     pub fn input(message: impl Into<String>) -> Self {
-        Self { kind: Kind::Input, message: message.into(), place: None }
+        Self { kind: ProblemKind::Input, message: message.into(), place: None }
     }
 
     /// Defect of the program.
     pub fn internal(message: impl Into<String>) -> Self {
-        Self { kind: Kind::Internal, message: message.into(), place: None }
+        Self { kind: ProblemKind::Internal, message: message.into(), place: None }
     }
 
     /// Interruption by the caller, without a partial result.
     pub fn interrupted() -> Self {
-        Self { kind: Kind::Interrupted, message: "interrupted; nothing was written".into(), place: None }
+        Self {
+            kind: ProblemKind::Interrupted,
+            message: "interrupted; nothing was written".into(),
+            place: None,
+        }
     }
 
     /// Bad input at a place of a text.
@@ -134,7 +138,9 @@ impl From<CalibrationError> for Problem {
     fn from(e: CalibrationError) -> Self {
         match e {
             CalibrationError::Simulation(e) => e.into(),
-            CalibrationError::Interrupted => Self { kind: Kind::Interrupted, ..Self::input(e.to_string()) },
+            CalibrationError::Interrupted => {
+                Self { kind: ProblemKind::Interrupted, ..Self::input(e.to_string()) }
+            }
             _ => Self::input(e.to_string()),
         }
     }

@@ -8,7 +8,7 @@ use crate::arguments::{Given, InputOptions, whole};
 use crate::call::{Answered, COMMANDS, call, call_json};
 use crate::conditions::{RequirementOptions, assigned, within};
 use crate::host::Host;
-use crate::problem::{Kind, Problem};
+use crate::problem::{Problem, ProblemKind};
 use crate::source::{Expected, Input, Source, title};
 
 const DECAY: &str =
@@ -21,7 +21,7 @@ fn asked(command: &str, request: &Value) -> Result<Answered, Problem> {
 
 fn refused(command: &str, request: &Value) -> String {
     let Err(problem) = asked(command, request) else { panic!("{command} answers {request}") };
-    assert_eq!(problem.kind, Kind::Input, "{command} {request}");
+    assert_eq!(problem.kind, ProblemKind::Input, "{command} {request}");
     problem.message
 }
 

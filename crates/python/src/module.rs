@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use obsdeg_calibration::record::Record;
-use obsdeg_commands::{Answered, Host, Kind, Now, Problem, call, call_allan, call_calibrate};
+use obsdeg_commands::{Answered, Host, Now, Problem, ProblemKind, call, call_allan, call_calibrate};
 use obsdeg_exact::interrupt;
 use obsdeg_report::Format;
 use pyo3::create_exception;
@@ -335,9 +335,9 @@ fn outcome(py: Python<'_>, done: Option<Done>, inside: Option<PyErr>) -> PyResul
 /// A problem as a Python exception.
 fn raised(problem: Problem) -> PyErr {
     match problem.kind {
-        Kind::Interrupted => PyKeyboardInterrupt::new_err(problem.message),
-        Kind::Internal => PyRuntimeError::new_err(problem.message),
-        Kind::Input => Python::attach(|py| {
+        ProblemKind::Interrupted => PyKeyboardInterrupt::new_err(problem.message),
+        ProblemKind::Internal => PyRuntimeError::new_err(problem.message),
+        ProblemKind::Input => Python::attach(|py| {
             let place = problem.place.as_ref().map(|p| (p.name.clone(), p.line_and_column()));
             let text = match &place {
                 Some((name, (line, column))) => {

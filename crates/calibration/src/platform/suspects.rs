@@ -14,7 +14,7 @@ use obsdeg_core::omitted::{OmittedClass, OmittedVerdicts, omitted_verdicts};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, CovarianceForm, EkfError, Gains};
 use obsdeg_evidence::simulation::omitted::{
-    Bench, ChangePerUnit, OmittedColumns, ResidualExplanation, Score, SuspectedChange, SuspectedError,
+    Bench, ChangePerUnit, OmittedColumns, ResidualExplanation, ScoreSums, SuspectedChange, SuspectedError,
     Suspicion,
 };
 use obsdeg_evidence::simulation::{
@@ -179,7 +179,7 @@ impl<'a> Silent<'a> {
 
 /// Sums over all runs, and the change of every coefficient of the platform per SI unit of every error.
 struct Tested {
-    score: Score,
+    score: ScoreSums,
     /// Changes by coefficient: name, unit, and one change per error.
     changes: Vec<(String, &'static str, Vec<f64>)>,
 }
@@ -205,7 +205,7 @@ fn tested(
     later: &[Option<Later>],
 ) -> Result<Tested, CalibrationError> {
     let m = model.terms().len();
-    let mut score = Score {
+    let mut score = ScoreSums {
         products: DMatrix::zeros(m, m),
         against: vec![0.0; m],
         chi_square: 0.0,
@@ -303,7 +303,7 @@ fn without_beginning(own: &mut Vec<f64>, passed: &mut [Passed], (x, mut of_begin
 }
 
 /// Adds the products of the passed columns with the residuals `own` and with each other.
-fn add_products(score: &mut Score, own: &[f64], passed: &[Passed]) {
+fn add_products(score: &mut ScoreSums, own: &[f64], passed: &[Passed]) {
     for (j, (_, column)) in passed.iter().enumerate() {
         score.against[j] += dot(column, own);
         for (k, (_, other)) in passed.iter().enumerate().take(j + 1) {

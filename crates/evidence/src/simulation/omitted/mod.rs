@@ -26,7 +26,7 @@ pub use answer::{
 };
 pub use bench::{Bench, BenchError};
 pub use columns::OmittedColumns;
-pub use score::{ResidualExplanation, Score, SuspectedChange, SuspectedError, Suspicion};
+pub use score::{ResidualExplanation, ScoreSums, SuspectedChange, SuspectedError, Suspicion};
 pub use weights::Influence;
 
 use crate::simulation::{

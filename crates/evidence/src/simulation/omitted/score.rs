@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-20;
 
 /// Sums over the whitened residuals of a fit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Score {
+pub struct ScoreSums {
     /// Products `w_j w_k` (errors x errors).
     pub products: DMatrix<f64>,
     /// Products `w_j r`, by error.
@@ -115,7 +115,7 @@ pub struct SuspectedChange {
     pub highest: f64,
 }
 
-impl Score {
+impl ScoreSums {
     /// Errors that these residuals can show.
     pub fn tried(&self) -> Vec<usize> {
         let m = self.against.len();

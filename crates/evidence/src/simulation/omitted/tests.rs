@@ -8,7 +8,7 @@ use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, CovarianceForm, Gains};
 use obsdeg_exact::SplitMix64;
 
-use super::{FamilyEffect, OmittedColumns, OmittedEffects, Score, omitted_effects};
+use super::{FamilyEffect, OmittedColumns, OmittedEffects, ScoreSums, omitted_effects};
 use crate::simulation::{Attained, Conditions, Noise, Plan, no_prior, si_per_shown};
 
 const W_IE: f64 = 7.292115e-5;
@@ -627,14 +627,14 @@ impl Records {
     }
 
     /// Score of a record with noise and errors of `sizes` (SI) in its truth.
-    fn score(&self, noise: &mut Noise, sizes: &[(usize, f64)]) -> Score {
+    fn score(&self, noise: &mut Noise, sizes: &[(usize, f64)]) -> ScoreSums {
         let mut z: Vec<f64> = (0..self.columns[0].0.len()).map(|_| 1e-5 * noise.normal()).collect();
         for (j, k) in sizes {
             z.iter_mut().zip(&self.columns[*j].0).for_each(|(z, o)| *z += k * o);
         }
         let own = self.whitened(&z);
         let dot = |a: &[f64]| a.iter().zip(&own).map(|(a, b)| a * b).sum::<f64>();
-        Score {
+        ScoreSums {
             products: self.products.clone(),
             against: self.columns.iter().map(|c| dot(&c.1)).collect(),
             chi_square: dot(&own),
