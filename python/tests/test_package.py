@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import os
 import pickle
 import random
 import subprocess
@@ -71,7 +72,7 @@ def test_commands_without_angles() -> None:
 def test_random_schemes_have_the_verdicts_of_the_program(tmp_path: Path) -> None:
     draw = random.Random(7)
     files = []
-    for i in range(50):
+    for i in range(int(os.environ.get("SCHEMES", "50"))):
         angles = [[draw.choice([0, 90, 180, -90, 45, 30, draw.randint(-180, 180)]) for _ in range(3)] for _ in range(draw.randint(1, 5))]
         scheme = obsdeg.Scheme(angles, carry=draw.choice(["platform", "inertial", "reset"]), latitude=draw.choice([None, 0, 90, "28.2"]))
         files.append(tmp_path / f"{i:03}.toml")
