@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use obsdeg_commands::{COMMANDS, Host, ProblemKind, call};
+use obsdeg_commands::{Host, call};
 use serde_json::{Value, json};
 
 fn root() -> &'static Path {
@@ -203,52 +203,4 @@ fn a_review_is_the_same_page() {
     let request = json!({ "sources": [source(file)], "runs": 10, "command": command });
     let answer = call("report", &request.to_string(), &mut Host::silent()).expect("a page");
     assert!(answer.text().expect("text") == fs::read_to_string(&page).expect("the page"));
-}
-
-#[test]
-fn wrong_requests_are_named() {
-    let wrong = |command: &str, request: Value| {
-        let problem = call(command, &request.to_string(), &mut Host::silent()).err().expect("refused");
-        assert_eq!(problem.kind, ProblemKind::Input);
-        problem.message
-    };
-    let said = wrong("analyze", json!({ "angels": ["0,0,0"] }));
-    assert!(said.starts_with("there is no option `angels` here; expected one of seed, angles,"), "{said}");
-    let said = wrong("analyze", json!({ "angles": ["0,0,0"], "carry": "sideways" }));
-    assert_eq!(said, "carry: `sideways` is no choice here (expected platform, inertial, reset)");
-    let said = wrong("analyze", json!({ "angles": ["0,0"] }));
-    assert!(said.starts_with("angles: "), "{said}");
-    let said = wrong("analyze", json!({}));
-    assert!(said.contains("angles A,B,G") && !said.contains("--"), "{said}");
-    let said = wrong("simulate", json!({ "angles": ["0,0,0"], "step": -1 }));
-    assert!(said.contains("step_s"), "{said}");
-    let said = wrong("design", json!({ "positions": 5, "within": 200 }));
-    assert_eq!(said, "within 200: expected 0 to 100 percent");
-    let said = wrong("analyze", json!({ "sources": [source("examples/sir/model.toml")], "carry": "reset" }));
-    assert!(said.starts_with("carry is about schemes; examples/sir/model.toml is a model file"), "{said}");
-    let said = wrong("judge", json!({}));
-    assert!(COMMANDS.iter().all(|c| said.contains(c)), "{said}");
-    assert!(wrong("analyze", json!([])).contains("no JSON object"));
-    let problem = call(
-        "analyze",
-        &json!({ "sources": [{ "name": "a.toml", "text": "\n\ncarry = 3\n" }] }).to_string(),
-        &mut Host::silent(),
-    );
-    let place = problem.err().expect("refused").place.expect("a place");
-    assert_eq!((place.name.as_str(), place.line_and_column().0), ("a.toml", 3));
-}
-
-/// Option sets survive the documented way to write and read them.
-#[test]
-fn options_are_read_back() {
-    let asked = json!({
-        "seed": 4, "angles": ["0,0,0@X_p:360"], "latitude": "28.2", "carry": "reset", "requirement": ["D=0.05"]
-    });
-    let options: obsdeg_commands::Simulate = serde_json::from_value(asked).expect("options");
-    let written = serde_json::to_string(&options).expect("text");
-    let again: obsdeg_commands::Simulate = serde_json::from_str(&written).expect("options");
-    assert_eq!(options, again);
-    let search = obsdeg_commands::Search { positions: Some(5), part: Some([1, 3]), ..Default::default() };
-    let written = serde_json::to_string(&search).expect("text");
-    assert_eq!(serde_json::from_str::<obsdeg_commands::Search>(&written).expect("options"), search);
 }

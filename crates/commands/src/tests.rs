@@ -7,8 +7,10 @@ use serde_json::{Value, json};
 use crate::arguments::{Given, InputOptions, whole};
 use crate::call::{Answered, COMMANDS, call, call_json};
 use crate::conditions::{RequirementOptions, assigned, within};
+use crate::design::options::Search;
 use crate::host::Host;
 use crate::problem::{Problem, ProblemKind};
+use crate::simulate::Simulate;
 use crate::source::{Expected, Input, Source, title};
 
 const DECAY: &str =
@@ -46,8 +48,25 @@ fn requests_are_objects_of_known_options() {
         let problem = call("analyze", request, &mut Host::silent()).err().expect("refused");
         assert!(problem.message.contains(expected), "{}", problem.message);
     }
-    let message = refused("simulate", &json!({ "slewrate": 1 }));
-    assert!(message.contains("no option `slewrate`") && message.contains(" slew_rate,"), "{message}");
+    let message = refused("analyze", &json!({ "angels": ["0,0,0"] }));
+    assert!(
+        message.starts_with("there is no option `angels` here; expected one of seed, angles,"),
+        "{message}"
+    );
+    let message = refused("analyze", &json!({ "angles": ["0,0,0"], "carry": "sideways" }));
+    assert_eq!(message, "carry: `sideways` is no choice here (expected platform, inertial, reset)");
+    let message = refused("analyze", &json!({ "angles": ["0,0"] }));
+    assert!(message.starts_with("angles: "), "{message}");
+    let message = refused("simulate", &json!({ "angles": ["0,0,0"], "step": -1 }));
+    assert!(message.contains("step_s"), "{message}");
+    let message = refused("design", &json!({ "positions": 5, "within": 200 }));
+    assert_eq!(message, "within 200: expected 0 to 100 percent");
+    let model = json!({ "sources": [{ "name": "decay.toml", "text": DECAY }], "carry": "reset" });
+    let message = refused("analyze", &model);
+    assert!(message.starts_with("carry is about schemes; decay.toml is a model file"), "{message}");
+    let wrong = json!({ "sources": [{ "name": "a.toml", "text": "\n\ncarry = 3\n" }] });
+    let place = asked("analyze", &wrong).err().expect("refused").place.expect("a place");
+    assert_eq!((place.name.as_str(), place.line_and_column().0), ("a.toml", 3));
     // the option whose value is of another type, and what was expected
     let message = refused("simulate", &json!({ "noise": 1e-5, "seed": "one" }));
     assert!(message.starts_with("seed: "), "{message}");
@@ -173,4 +192,18 @@ fn requirements_concern_an_unknown_and_are_stated_once() {
     let message = concern(&["D_FW=1"]).expect_err("refused").message;
     assert!(message.contains("no unknown here is `D_FW`") && message.contains("D_F"), "{message}");
     assert!(concern(&["D=1", "D=2"]).is_err());
+}
+
+/// Option sets survive the documented way to write and read them.
+#[test]
+fn options_are_read_back() {
+    let asked = json!({
+        "seed": 4, "angles": ["0,0,0@X_p:360"], "latitude": "28.2", "carry": "reset", "requirement": ["D=0.05"]
+    });
+    let options: Simulate = serde_json::from_value(asked).expect("options");
+    let written = serde_json::to_string(&options).expect("text");
+    assert_eq!(serde_json::from_str::<Simulate>(&written).expect("options"), options);
+    let search = Search { positions: Some(5), part: Some([1, 3]), ..Search::default() };
+    let written = serde_json::to_string(&search).expect("text");
+    assert_eq!(serde_json::from_str::<Search>(&written).expect("options"), search);
 }
