@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::attitude::Matrix3;
-use super::ring::Float;
 use super::rotation::{Axis, Rotation, SlewAxis, SlewTo};
 
 /// Earth rate in rad/s.
@@ -29,7 +28,10 @@ impl Turn {
 /// Product `a b` in floating point.
 #[inline]
 pub fn times(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
-    crate::model::attitude::product(&Float, a, b)
+    // in the order of `product`, whose sums begin with 0; each step of an integration multiplies some
+    let dot = |r: &[f64; 3], j: usize| 0.0 + r[0] * b[0][j] + r[1] * b[1][j] + r[2] * b[2][j];
+    let row = |r: &[f64; 3]| [dot(r, 0), dot(r, 1), dot(r, 2)];
+    [row(&a[0]), row(&a[1]), row(&a[2])]
 }
 
 /// Product `a b` of a matrix and a vector.
@@ -56,7 +58,11 @@ pub fn rotation(v: &[f64; 3]) -> Matrix3<f64> {
     };
     let k = cross(v);
     let k2 = times(&k, &k);
-    std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j)) + s * k[i][j] + c * k2[i][j]))
+    let row = |i: usize| {
+        let entry = |j: usize| f64::from(u8::from(i == j)) + s * k[i][j] + c * k2[i][j];
+        [entry(0), entry(1), entry(2)]
+    };
+    [row(0), row(1), row(2)]
 }
 
 /// Matrix `[v x]`.
