@@ -93,15 +93,7 @@ impl Transform {
         let f = self.f;
         let size = size_for(n);
         if n < SHORT || size.next_power_of_two().trailing_zeros() as usize > self.roots.len() {
-            let sum = |list: &Vec<(usize, usize, &[u64])>| {
-                interrupt::check();
-                let products = list.iter().filter_map(|&(i, _, b)| Some(self.product(of[i]?, b, n)));
-                products.reduce(|mut sum, product| {
-                    sum.iter_mut().zip(product).for_each(|(x, y)| *x = f.add(*x, y));
-                    sum
-                })
-            };
-            return lists.iter().map(sum).collect();
+            return lists.iter().map(|list| self.sum_of_products(of, list, n)).collect();
         }
         if size != self.size {
             self.spectra.clear();
@@ -149,6 +141,21 @@ impl Transform {
             Some(self.coefficients(out, n))
         };
         lists.iter().map(sum).collect()
+    }
+
+    /// A sum of products as in `sums`, each product by itself.
+    fn sum_of_products(
+        &self,
+        of: &[Option<&[u64]>],
+        list: &[(usize, usize, &[u64])],
+        n: usize,
+    ) -> Option<Vec<u64>> {
+        interrupt::check();
+        let products = list.iter().filter_map(|&(i, _, b)| Some(self.product(of[i]?, b, n)));
+        products.reduce(|mut sum, product| {
+            sum.iter_mut().zip(product).for_each(|(x, y)| *x = self.f.add(*x, y));
+            sum
+        })
     }
 
     /// Inverses of the sizes of the blocks of a spectrum.

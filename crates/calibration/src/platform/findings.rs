@@ -49,25 +49,7 @@ impl AnswerData<'_> {
         out.extend(self.problem.runs.iter().filter_map(|run| self.turns(run)));
         out.extend(c.records.iter().filter_map(|record| clock(record, c)));
         out.extend(self.fits(c));
-        for (r, record) in c.records.iter().enumerate() {
-            let tests = (c.records.len() * c.channels.len()) as f64;
-            for (k, channel) in c.channels.iter().enumerate() {
-                if let Some(probability) =
-                    self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < levels::CORRELATED)
-                {
-                    let (record, channel) = (record.name.clone(), channel.channel.clone());
-                    out.push(CalibrationFinding::Correlated { record, channel, probability });
-                }
-                if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < levels::TEMPERATURE) {
-                    out.push(CalibrationFinding::Temperature {
-                        record: record.name.clone(),
-                        channel: channel.channel.clone(),
-                        correlation: w.correlation,
-                        probability: w.probability,
-                    });
-                }
-            }
-        }
+        out.extend(self.findings_of_channels(c));
         out.extend(
             self.too_many.map(|count| CalibrationFinding::Outliers { count, of: self.found.all.len() }),
         );
@@ -84,6 +66,31 @@ impl AnswerData<'_> {
         let difference = c.second_path.difference.max(c.second_path.sigma_difference);
         if difference.is_nan() || difference > AGREE {
             out.push(CalibrationFinding::SecondPath { difference });
+        }
+        out
+    }
+
+    /// Findings on the residuals of single channels, of every record.
+    fn findings_of_channels(&self, c: &Calibration) -> Vec<CalibrationFinding> {
+        let tests = (c.records.len() * c.channels.len()) as f64;
+        let mut out = Vec::new();
+        for (r, record) in c.records.iter().enumerate() {
+            for (k, channel) in c.channels.iter().enumerate() {
+                if let Some(probability) =
+                    self.whiteness(r, k).filter(|p| p.is_nan() || p * tests < levels::CORRELATED)
+                {
+                    let (record, channel) = (record.name.clone(), channel.channel.clone());
+                    out.push(CalibrationFinding::Correlated { record, channel, probability });
+                }
+                if let Some(w) = self.warmth(r, k).filter(|w| w.probability * tests < levels::TEMPERATURE) {
+                    out.push(CalibrationFinding::Temperature {
+                        record: record.name.clone(),
+                        channel: channel.channel.clone(),
+                        correlation: w.correlation,
+                        probability: w.probability,
+                    });
+                }
+            }
         }
         out
     }

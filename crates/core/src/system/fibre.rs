@@ -452,23 +452,42 @@ pub(super) struct CountingPoint<'a> {
     /// Consequences of relations for the unknowns.
     pub(super) known: &'a RelationConsequences,
     /// Functions whose values are counted too, together with all unknowns and the combinations that the model
-    /// asks for. For unknowns that are not
-    /// observable these are the values while as many of them are fixed as there are unobservable directions.
+    /// asks for. For unknowns that are not observable these are the values while as many of them are fixed as
+    /// there are unobservable directions.
     /// `None`: only observable unknowns.
     pub(super) functions: Option<&'a [QuotientTerms]>,
 }
+
+/// Polynomial whose roots are the values that an unknown takes, constant term first.
+type RootPolynomial = Result<Vec<u64>, NotCounted>;
 
 /// Values of the unknowns among all points with the same outputs.
 #[derive(Debug, Clone)]
 pub(super) struct Fibre {
     /// Values of the unknowns at the point itself.
     pub(super) values: Vec<u64>,
-    /// Polynomial of every unknown whose roots are the values that it takes, constant term first.
-    pub(super) polynomials: Vec<Result<Vec<u64>, NotCounted>>,
+    /// Polynomial of every unknown.
+    pub(super) polynomials: Vec<RootPolynomial>,
     /// True if all unknowns together take two values.
     pub(super) is_pair: bool,
     /// Numbers of values of the functions, then of the combinations that the model asks for.
     pub(super) functions: Vec<Result<usize, NotCounted>>,
+}
+
+/// Variables that occur, from the latest on, which are the largest and eliminated first, and the polynomials
+/// with the places in this list as variables.
+fn renumbered(lists: [&[Polynomial]; 2], variables: usize) -> Option<(Vec<usize>, [Vec<Polynomial>; 2])> {
+    let occurs = |v: &usize| lists.iter().copied().flatten().any(|p| p.terms_with(*v as u32) > 0);
+    let used: Vec<usize> = (0..variables).filter(occurs).rev().collect();
+    let mut place = vec![None; variables];
+    for (i, &v) in used.iter().enumerate() {
+        place[v] = Some(i as u32);
+    }
+    let renamed = |list: &[Polynomial]| -> Option<Vec<Polynomial>> {
+        list.iter().map(|p| p.renamed(|v| place[v as usize])).collect()
+    };
+    let [first, second] = lists.map(renamed);
+    Some((used, [first?, second?]))
 }
 
 /// Values that every unknown takes at one random point.
@@ -501,29 +520,13 @@ pub(super) fn at_point(
     let mut joint = Polynomial::default();
     wanted.iter().for_each(|p| joint.add_scaled(&f, p, rng.below(f.modulus())));
     wanted.push(joint);
-    // the latest variables are the largest: they are eliminated first
-    let used: Vec<usize> = (0..values.len())
-        .filter(|&v| zero.iter().chain(&wanted).any(|p| p.terms_with(v as u32) > 0))
-        .rev()
-        .collect();
-    let mut place = vec![None; values.len()];
-    for (i, &v) in used.iter().enumerate() {
-        place[v] = Some(i as u32);
-    }
-    let renamed = |list: &[Polynomial]| -> Option<Vec<Polynomial>> {
-        list.iter().map(|p| p.renamed(|v| place[v as usize])).collect()
-    };
-    let (Some(zero), Some(mut wanted)) = (renamed(&zero), renamed(&wanted)) else {
-        return Err(NotCounted::NoPoint);
-    };
+    let (used, [zero, mut wanted]) = renumbered([&zero, &wanted], values.len()).ok_or(NotCounted::NoPoint)?;
     let joint = wanted.pop().unwrap_or_default();
     let weights: Vec<u32> = used.iter().map(|&v| weights[v]).collect();
     let mut basis = GroebnerBasis::new(&f, &weights, &zero, work);
     let mut ring = Quotients { f, basis: &mut basis };
-    let polynomials: Vec<Result<Vec<u64>, NotCounted>> =
-        wanted.iter().map(|p| ring.values(p, work)).collect();
-    let two =
-        |p: &Result<Vec<u64>, NotCounted>| p.as_ref().is_ok_and(|p| polynomial::distinct_roots(&f, p) == 2);
+    let polynomials: Vec<RootPolynomial> = wanted.iter().map(|p| ring.values(p, work)).collect();
+    let two = |p: &RootPolynomial| p.as_ref().is_ok_and(|p| polynomial::distinct_roots(&f, p) == 2);
     let is_pair = polynomials.iter().any(two) && two(&ring.values(&joint, work));
     let elements: Vec<Polynomial> =
         wanted.into_iter().chain(known.into_iter().map(Polynomial::constant)).collect();

@@ -152,22 +152,15 @@ fn judge_in_fields(
         };
         if first.agrees(&second) {
             let claim = RankClaim { order, ..claim(compiled, layout, &first.degrees, runs) };
-            let (mut third, mut error_bound) = (None, bound_in(&claim, 2));
-            if error_bound > CERTAIN {
+            let mut third = None;
+            if bound_in(&claim, 2) > CERTAIN {
                 let (r, other) = judged(2, spent)?;
                 if !first.agrees(&other) {
                     continue;
                 }
-                (third, error_bound) = (Some(r.modulus()), bound_in(&claim, 3));
+                third = Some(r);
             }
-            if error_bound > CERTAIN {
-                return Err(refuse(format!(
-                    "undecided, because the powers in it are too high for primes of 61 bits: three agree, \
-                     but a verdict may be wrong with probability {error_bound:.0e}, where {CERTAIN:.0e} is \
-                     expected at most"
-                )));
-            }
-            let primes = ByPrimes { primes: [p, q].map(|f| f.modulus()), third, error_bound };
+            let primes = certain([p, q], third, &claim)?;
             let span = first.span.clone();
             let judged = Judgement::of(model, layout.clone(), first, SystemCertainty::Primes(primes), seed);
             let fields = compiled.dag.is_rational().then_some([p, q]);
@@ -179,6 +172,19 @@ fn judge_in_fields(
         "two random primes disagreed {ATTEMPTS} times in a row; expected at most one disagreement in 10^6 \
          runs: please report this model"
     )))
+}
+
+/// Primes that agree on the verdicts, with the bound on an error of all together; refused above `CERTAIN`.
+fn certain(two: [Field; 2], third: Option<Field>, claim: &RankClaim) -> Result<ByPrimes, ModelError> {
+    let error_bound = bound_in(claim, if third.is_some() { 3 } else { 2 });
+    if error_bound > CERTAIN {
+        return Err(refuse(format!(
+            "undecided, because the powers in it are too high for primes of 61 bits: three agree, but a \
+             verdict may be wrong with probability {error_bound:.0e}, where {CERTAIN:.0e} is expected at most"
+        )));
+    }
+    let third = third.map(|f| f.modulus());
+    Ok(ByPrimes { primes: two.map(|f| f.modulus()), third, error_bound })
 }
 
 /// False if verdicts in prime fields differ from those at a real point. Constraints may hold on several

@@ -108,9 +108,8 @@ impl<'a> Task<'a> {
         // where the number of positions is searched for, errors of single positions do not exist
         Bench::check(&conditions.bench, options.positions.unwrap_or(0), false)
             .map_err(SimulationError::from)?;
-        let omitted = OmittedErrors::of(base, &platform, conditions, &options.immune)?;
-        let omitted = omitted.filter(|_| !of_psi || conditions.bench.is_empty());
-        let criterion = criterion(options.criterion, &limits);
+        let omitted = OmittedErrors::of(base, &platform, conditions, &options.immune)?
+            .filter(|_| !of_psi || conditions.bench.is_empty());
         let indices: Vec<usize> = required.iter().map(|r| r.1).collect();
         let slew_sequences = is_slew_sequence(base);
         // for slew sequences the rows only tell which attitudes are the same
@@ -135,7 +134,7 @@ impl<'a> Task<'a> {
             options,
             candidates,
             required,
-            criterion,
+            criterion: criterion(options.criterion, &limits),
             constraints: constraints(options, limits, caps),
             rows,
             symmetry,
