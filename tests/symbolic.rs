@@ -322,7 +322,7 @@ fn verdicts_are_said_before_the_engine_is_there() {
     }
 }
 
-/// Models do not need the engine: with expressions, for every third reference model, nothing is missing while
+/// Models do not need the engine: with expressions, for every ninth reference model, nothing is missing while
 /// another process holds it.
 #[test]
 fn no_model_starts_the_engine() {
@@ -335,7 +335,7 @@ fn no_model_starts_the_engine() {
     files.sort();
     let mut command = Command::new(env!("CARGO_BIN_EXE_obsdeg"));
     command.args(["analyze", "--format", "json", "-q", "--engine-wait", "0"]);
-    command.args(files.iter().step_by(3)).env("XDG_RUNTIME_DIR", folder.path());
+    command.args(files.iter().step_by(9)).env("XDG_RUNTIME_DIR", folder.path());
     let output = command.output().expect("it runs");
     assert!(
         output.status.success() && output.stderr.is_empty(),
@@ -343,7 +343,7 @@ fn no_model_starts_the_engine() {
         String::from_utf8_lossy(&output.stderr)
     );
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(text.matches("\"one_by_expression\"").count() > 60 && !text.contains("symbolic engine"));
+    assert!(text.matches("\"one_by_expression\"").count() > 20 && !text.contains("symbolic engine"));
 }
 
 #[test]

@@ -19,6 +19,10 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 #: Folder of the checkout.
 ROOT = Path(__file__).resolve().parents[2]
+#: True where all is tested, as by `.ci/run release`; otherwise long tests take a sample of their cases.
+AT_LENGTH = "AT_LENGTH" in os.environ
+#: Mark of tests that run at full length only.
+at_length = pytest.mark.skipif(not AT_LENGTH, reason="at full length, with AT_LENGTH=1, as `.ci/run release` does")
 #: What mypy found of the libraries, which one run reads and the next one uses: `cache_dir` in pyproject.toml.
 MYPY_CACHE = ROOT / "target" / "mypy"
 

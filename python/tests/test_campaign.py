@@ -18,6 +18,7 @@ from typing import Any
 import obsdeg
 import pytest
 import sympy
+from conftest import at_length
 from obsdeg import campaign
 
 PAIR = [(0, 0, 0), (180, 0, 0)]
@@ -189,6 +190,7 @@ def search_with_a_worker_killed(folder: Path, executor: Any, victim: int) -> Non
     assert killed and without_parts(found) == obsdeg.design(**search).to_dict()
 
 
+@at_length
 def test_ray_with_a_worker_killed(tmp_path: Path) -> None:
     ray = pytest.importorskip("ray", reason="Ray is not installed: that its executor works is not tested")
     try:

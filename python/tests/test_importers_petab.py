@@ -10,7 +10,7 @@ from typing import Any
 
 import mpmath
 import pytest
-from conftest import judge, shared
+from conftest import at_length, judge, shared
 from petab_oracle import Model, Tables, observed, prepared
 from toml_numbers import Numbers, value
 
@@ -80,7 +80,7 @@ def test_all_problems_are_judged_or_refused() -> None:
     assert sum(not options for options, _, _ in JUDGED.values()) >= 20
 
 
-@pytest.mark.parametrize("name", sorted(JUDGED))
+@pytest.mark.parametrize("name", [pytest.param(n, marks=at_length) if n == "Bachmann" else n for n in sorted(JUDGED)])
 def test_verdicts(name: str) -> None:
     # 36 experiments of 101 unknowns need 2.2e9 operations, and the default limit says so
     answer = judge(imported(name), *(["--work-limit", "3000"] if name == "Bachmann" else []))

@@ -212,7 +212,7 @@ def test_other_threads_go_on() -> None:
     thread = threading.Thread(target=tick)
     thread.start()
     began = time.monotonic()
-    obsdeg.design(6, carry="inertial", restarts=20)
+    obsdeg.design(6, carry="inertial", restarts=2)
     took = time.monotonic() - began
     done.set()
     thread.join()

@@ -27,6 +27,7 @@ fn review(scheme: &Scheme) -> ComparedScheme {
 
 /// The information of all samples, against a filter with an uninformative prior and no drift noise.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn the_predicted_sigma_is_that_of_a_filter() {
     for (attitudes, carry) in [
         (&S6[..5], Carry::Inertial),
@@ -96,6 +97,7 @@ fn sensitivity_says_what_the_assumptions_are_worth() {
 /// Every unknown with a requirement counts, psi of every position included. An unobservable unknown misses
 /// its requirement.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn requirements_are_those_of_all_unknowns() {
     let missed = |r: &ComparedScheme| -> Vec<(String, Miss)> {
         r.requirements.missed.iter().map(|m| (m.name.clone(), m.why)).collect()
@@ -226,6 +228,7 @@ fn positions_that_can_go() {
 /// The table states what it compares: schemes under other carries (without slews), and schemes with different
 /// tasks.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn what_is_not_alike_is_said() {
     let twelve = "examples/twelve-positions/scheme.toml";
     let text = printed(&[twelve]);

@@ -8,7 +8,8 @@ use obsdeg_core::system::{
 };
 use serde_json::Value;
 
-use crate::models::models;
+use crate::models::{models, some_models};
+use crate::program::cases;
 
 fn analyzed(text: &str) -> SystemAnalysis {
     let model = model_file::read(text).unwrap_or_else(|e| panic!("{e}: {text}"));
@@ -326,12 +327,12 @@ fn functions_of_other_factors_by_hand() {
     assert!(words.contains(&"add c to q; subtract c from w''"), "{words:?}");
 }
 
-/// All reference models: the rank equals the number of observable unknowns and functions. Each function is
+/// Reference models: the rank equals the number of observable unknowns and functions. Each function is
 /// observable with the same degree when requested as a combination.
 #[test]
 fn functions_are_complete() {
     let (mut missing, mut asked) = (Vec::new(), 0);
-    for (name, reference, text) in models() {
+    for (name, reference, text) in some_models() {
         let model = json::read(&text).expect("a model");
         let options = SystemOptions { solutions: false, ..SystemOptions::default() };
         let a = analyze_system(&model, options).expect("judged");
@@ -354,15 +355,15 @@ fn functions_are_complete() {
         }
     }
     assert_eq!(missing, Vec::<String>::new());
-    assert!(asked > 100, "{asked}");
+    assert!(asked > cases(30, 100), "{asked}");
 }
 
-/// Reduced versions of all reference models that are not fully observable: judged again they are fully
+/// Reduced versions of reference models that are not fully observable: judged again they are fully
 /// observable, with the same rank.
 #[test]
 fn reduced_models_are_fully_observable() {
     let (mut made, mut refused) = (0, 0);
-    for (name, reference, text) in models() {
+    for (name, reference, text) in some_models() {
         let model = json::read(&text).expect("a model");
         match reduced(&model, 1, None) {
             Ok(found) => {
@@ -378,5 +379,5 @@ fn reduced_models_are_fully_observable() {
             Err(e) => panic!("{name}: {e}"),
         }
     }
-    assert_eq!((made, refused), (71, 22));
+    assert!(made >= cases(20, 71) && refused >= cases(4, 22), "{made} {refused}");
 }

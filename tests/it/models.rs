@@ -17,6 +17,13 @@ use obsdeg_evidence::crosscheck::Agreement;
 use obsdeg_evidence::system::{Numeric, SystemEvidence, crosscheck_system, simulate_system};
 use serde_json::Value;
 
+use crate::program::cases;
+
+/// Every third reference model, or all with `AT_LENGTH=1`.
+pub(crate) fn some_models() -> impl Iterator<Item = (String, Value, String)> {
+    models().into_iter().step_by(cases(3, 1))
+}
+
 /// Reference models: name, JSON value, JSON text.
 pub(crate) fn models() -> Vec<(String, Value, String)> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/models");

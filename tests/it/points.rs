@@ -3,6 +3,8 @@
 use obsdeg_core::language::{Names, evaluate_f64, parse_with};
 use obsdeg_core::system::{ModelError, SystemAnalysis, SystemOptions, analyze_system, model_file};
 
+use crate::program::cases;
+
 /// Answer on a model with constant states x and y, outputs y and a, and the given constraints, or the error.
 fn judged(constraints: &[&str], rest: &str, seed: u64) -> Result<SystemAnalysis, ModelError> {
     let list: Vec<String> = constraints.iter().map(|c| format!("'{c}'")).collect();
@@ -175,7 +177,10 @@ fn sums_of_expanded_squares_have_no_point() {
         ("x^2 + y^2 = 2*x*y - 1", "(x - y)^2 + 1"),
         ("x^2*y^2 - 2*x*y + 1 + x^2 = 0", "(x*y - 1)^2 + x^2"),
         ("x^4 - 2*x^2*y^2 + y^4 + 1 = 0", "(x^2 - y^2)^2 + 1"),
-    ] {
+    ]
+    .into_iter()
+    .take(cases(2, 3))
+    {
         let (of, sum) = (difference(constraint), difference(&format!("{squares} = 0")));
         for p in grid() {
             let (a, b) = (of(p), sum(p));
@@ -250,6 +255,7 @@ fn all_that_is_said_is_of_one_way() {
 /// Constraints with dependent gradients at their points are refused, since a verdict from the gradients would
 /// be wrong.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn dependent_gradients_are_refused() {
     for (constraints, point) in [
         (&["x^2 + y^2 = 0"][..], [0.0, 0.0]),

@@ -44,6 +44,12 @@ pub(crate) fn refused(arguments: &[&str], expected: &[&str]) {
     }
 }
 
+/// Number of cases of a test: the first every day, the second with `AT_LENGTH=1`, as `.ci/run release` sets
+/// it.
+pub(crate) fn cases(daily: usize, all: usize) -> usize {
+    if std::env::var_os("AT_LENGTH").is_some() { all } else { daily }
+}
+
 pub(crate) fn scratch() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("verdicts.json");

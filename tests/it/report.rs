@@ -537,6 +537,7 @@ fn what_cannot_be_reported_is_refused_and_nothing_is_written() {
 /// named.
 #[test]
 #[expect(clippy::print_stderr, reason = "a skipped test says so")]
+#[ignore = "seconds: .ci/run release"]
 fn a_browser_prints_the_pdf() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("review.pdf");

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::program::{json, run, stdout};
+use crate::program::{cases, json, run, stdout};
 use crate::validator::faults;
 
 /// Kinds of `obsdeg schema`.
@@ -104,7 +104,7 @@ fn files_and_answers_are_as_their_schemas_say() {
         *seen.entry(name).or_default() += 1;
     };
     for (kind, files) in [("scheme", examples("scheme")), ("model", examples("model"))] {
-        for file in &files {
+        for file in files.iter().step_by(cases(4, 1)) {
             let text =
                 std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("text");
             let value: toml::Value = toml::from_str(&text).expect("TOML");

@@ -223,6 +223,7 @@ fn solutions_beyond_the_limit_name_their_option() {
 
 /// Adversarial texts: each is refused, and the message names the exceeded limit.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn small_texts_that_ask_for_too_much_are_refused() {
     let powers = (0..12).fold("p".to_string(), |inner, _| format!("({inner})^1000"));
     let long = "n".repeat(1_000_000);
@@ -292,6 +293,7 @@ fn small_texts_that_ask_for_too_much_are_refused() {
 /// model in many digits, and rows that lose so many digits that every row needs a new computation of all of
 /// them.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn models_that_took_too_long_end() {
     let drawn = |seed: u64| model(&mut SplitMix64::of(seed, "small models", &["any"]));
     let long = answered(&drawn(2684), &[]).expect("judged");

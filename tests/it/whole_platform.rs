@@ -7,6 +7,8 @@ use obsdeg_core::model::{
 };
 use obsdeg_exact::SplitMix64;
 
+use crate::program::cases;
+
 fn unknowns(terms: &str) -> Unknowns {
     terms.parse().expect("terms")
 }
@@ -177,7 +179,7 @@ fn both_paths_agree(scheme: &Scheme) {
 /// 90, 120 and other angles.
 #[test]
 fn a_second_path() {
-    second_paths(12);
+    second_paths(cases(4, 12));
 }
 
 /// Random terms and attitudes, rotations and rotations by samples, more of each.
@@ -348,7 +350,7 @@ fn wrong_use_has_a_reason() {
 /// derivatives of Z changes no verdict.
 #[test]
 fn rotating_segments_by_the_second_path() {
-    rotations_by_the_second_path(9);
+    rotations_by_the_second_path(cases(4, 9));
 }
 
 fn rotations_by_the_second_path(cases: usize) {
@@ -379,7 +381,7 @@ fn rotations_by_the_second_path(cases: usize) {
 /// confirm the exact verdict. No degree is below that with the drifts alone.
 #[test]
 fn histories_by_samples() {
-    rotations_by_samples(10);
+    rotations_by_samples(cases(5, 10));
 }
 
 fn rotations_by_samples(cases: usize) {

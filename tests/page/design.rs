@@ -49,9 +49,7 @@ fn the_best_positions_are_found() {
     let best = answer["found"][0]["value"].as_f64().expect("a number");
     assert!(value.as_str().is_some_and(|v| v.starts_with(&best.to_string()[..4])), "{value} {best}");
     choose(b, "#design-criterion", "worst");
-    write(b, "#design-observable", "");
     // what was found under conditions that changed meanwhile says so
-    write(b, "#design-k", "5");
     click(b, "#design-go");
     choose(b, "#carry", "reset");
     wait(
@@ -63,6 +61,7 @@ fn the_best_positions_are_found() {
     wait(b, "of these", FOUND);
     // a longer search is stopped, and the next one starts
     click(b, "#tab-design");
+    write(b, "#design-observable", "");
     write(b, "#design-k", "9");
     click(b, "#design-go");
     wait(b, "under way", "!document.getElementById('design-stop').disabled");
@@ -70,7 +69,8 @@ fn the_best_positions_are_found() {
     wait(b, "ended", "document.getElementById('design-said').textContent == 'Stopped.'");
     // what was found before stays
     assert!(b.value("document.querySelectorAll('#found tbody tr').length").as_u64() > Some(0));
-    write(b, "#design-k", "5");
+    write(b, "#design-observable", "D_F");
+    write(b, "#design-k", "3");
     click(b, "#design-go");
     wait(b, "again", FOUND);
     quiet(b);
@@ -247,7 +247,9 @@ fn errors_of_a_search_stand_at_their_fields() {
     write(b, "#design-k", "4");
     wait(b, "mended", "!document.querySelector('#panel-design .wrong')");
     // a mended request is searched
-    write(b, "#design-k", "5");
+    write(b, "#design-k", "3");
+    write(b, "#design-observable", "D_F");
+    choose(b, "#carry", "inertial");
     click(b, "#design-go");
     wait(b, "found", FOUND);
     assert_eq!(b.value("document.querySelectorAll('#panel-design .wrong').length"), json!(0));

@@ -10,7 +10,7 @@ use crate::opened::{
     choose, click, drag, key, names, opened, place, quiet, root, says, scheme, swipe, thumb, wait, write,
     wrong,
 };
-use crate::program::run;
+use crate::program::{cases, run};
 
 #[test]
 fn positions_are_edited() {
@@ -289,7 +289,7 @@ fn it_keeps_up() {
     );
     // the best of a few drags
     let mut least = f64::INFINITY;
-    for round in 0..5 {
+    for round in 0..cases(3, 5) {
         wait(b, "sigmas and solutions", settled);
         b.value("performance.clearMeasures(), 1");
         let engine = b.value(&alone).as_f64().expect("milliseconds");

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::browser::Browser;
 use crate::opened::{choose, click, is_built, key, opened, quiet, root, says, scheme, wait, write};
-use crate::program::run;
+use crate::program::{cases, run};
 
 #[test]
 fn the_page_is_small_and_asks_for_nothing() {
@@ -60,7 +60,7 @@ fn its_json_is_that_of_the_command_line() {
     let examples = browser.value("JSON.parse(document.getElementById('data').textContent).examples");
     let examples = examples.as_array().expect("a list");
     assert!(examples.len() > 25, "{}", examples.len());
-    for example in examples {
+    for example in examples.iter().step_by(cases(4, 1)) {
         let (name, kind) =
             (example["name"].as_str().expect("a name"), example["kind"].as_str().expect("a kind"));
         let file = format!("examples/{name}/{kind}.toml");
@@ -425,7 +425,7 @@ fn it_is_for_everyone() {
     wait(b, "a next position", "document.querySelector('#next tbody tr')");
     click(b, "#verdicts tr[data-name=D_FZ] button.why");
     wait(b, "an explanation", "document.querySelector('#why tbody tr')");
-    for scheme in ["light", "dark"] {
+    for scheme in ["dark", "light"].into_iter().take(cases(1, 2)) {
         let wanted = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
         b.call("Emulation.setEmulatedMedia", wanted);
         for tab in ["text", "design", "scheme"] {

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use crate::engine;
 
 /// Time after which a command ends whose progress nobody took: its question was dropped.
-const PATIENCE: Duration = Duration::from_secs(5);
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Progress of a command that was sent and not yet taken.
 struct Untaken {

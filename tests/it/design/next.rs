@@ -586,6 +586,7 @@ fn promised_sigmas_are_kept_in_200_simulated_runs() {
 /// A calibration that misses requirements names further runs; asked for one of these coefficients, the next
 /// position after that calibration is the same attitude with the same sigma.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn calibrate_names_the_same_position() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("calibration");
@@ -655,6 +656,7 @@ fn no_attitude_is_better_than_the_bound() {
 
 /// After the calibration of the bench: 744 candidates by the program itself.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn the_bound_of_the_bench_is_near() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("calibration");

@@ -79,6 +79,7 @@ fn two_cores_take_at_most_three_fifths_of_the_time() {
 /// Seventeen positions of twelve candidates. By default the answer is the scheme of an exchange with its
 /// largest distance to a bound. With a smaller `--within` all sequences are searched.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn what_would_be_searched_for_minutes_is_certified() {
     let certified = DesignOptions {
         candidates: twelve(),
@@ -116,6 +117,7 @@ fn what_would_be_searched_for_minutes_is_certified() {
 /// Weights over all attitudes list every attitude once, with angles in the usual ranges, and attain the
 /// stated criterion by the equations.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn weights_over_all_attitudes_are_reported_once() {
     let candidates = twelve();
     let base = Scheme { latitude: "45".parse().ok(), ..base(Carry::Reset) };

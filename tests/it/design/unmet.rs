@@ -31,6 +31,7 @@ fn between<'t>(text: &'t str, before: &str, behind: &str) -> &'t str {
 /// Every suggestion is tried with the printed options: the search finds a scheme, and a comparison confirms
 /// that it meets every requirement.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn what_would_do_does() {
     let output = run(&asked(&["--positions", "5"]));
     let message = stderr(&output);
@@ -97,7 +98,7 @@ fn what_would_do_does() {
 fn conditions_are_those_of_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("scheme.toml");
-    let positions = "[[position]]\nattitude = \"NUE\"\n".repeat(4);
+    let positions = "[[position]]\nattitude = \"NUE\"\n".repeat(3);
     std::fs::write(
         &file,
         format!(
@@ -111,7 +112,7 @@ fn conditions_are_those_of_a_file() {
     let by_options = json(&[
         "design",
         "--positions",
-        "4",
+        "3",
         "--carry",
         "inertial",
         "--latitude",
@@ -133,8 +134,8 @@ fn conditions_are_those_of_a_file() {
     ]);
     assert_eq!(by_file, by_options);
     // options override the number of positions and the candidates
-    let other = ["--positions", "3", "--candidates", "grid:45", "--observable", "D_F", "--format", "json"];
+    let other = ["--positions", "2", "--candidates", "grid:45", "--observable", "D_FX", "--format", "json"];
     let other = json(&[&["design", &file][..], &other].concat());
-    assert_eq!((&other["search"]["positions"], &other["carry"]), (&3.into(), &"inertial".into()));
+    assert_eq!((&other["search"]["positions"], &other["carry"]), (&2.into(), &"inertial".into()));
     assert!(other["candidates"].as_array().map_or(0, Vec::len) > 24);
 }

@@ -34,6 +34,7 @@ fn c_c_n([alpha, beta, gamma]: [f64; 3]) -> Matrix3<f64> {
 /// Reference: Runge-Kutta integration of `Phi' = F Phi`, `Q' = F Q + Q F^T + N` with F and N written here:
 /// psi in n, then the biases X: K, B; Y: K; Z: B.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn steps_of_the_biases_against_integration() {
     type States = SMatrix<f64, 7, 7>;
     let (attitude, latitude) = ([10.0, 25.0, 40.0], 28.2f64.to_radians());
@@ -143,6 +144,7 @@ fn statistics(filter: &Conditions, truth: &Conditions, scheme: &Scheme, runs: us
 /// truth only, both are far above. Cases: linear truth, exact truth (drifts small enough for the linear
 /// filter), slews and a rotating segment.
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn monte_carlo_with_the_states_in_filter_and_truth() {
     states_in_filter_and_truth(RUNS[0]);
 }

@@ -93,6 +93,7 @@ fn by_differences(f: impl Fn(&DVector<f64>) -> DVector<f64>) -> DMatrix<f64> {
 }
 
 #[test]
+#[ignore = "seconds: .ci/run release"]
 fn an_independent_filter_has_the_same_estimates() {
     for (scheme, attitudes) in [
         (paper(Carry::Platform), vec!["0,0,0", "180,0,0"]),

@@ -191,7 +191,8 @@ fn a_bench_counts_as_much_as_its_error_changes() {
 fn an_error_is_distinguished_from_an_open_beginning() {
     use crate::simulator::AtOnce;
     let (mut named, mut open) = (0, 0);
-    for seed in 0..12 {
+    let count = if std::env::var_os("AT_LENGTH").is_some() { 12 } else { 5 };
+    for seed in (0..).take(count) {
         let positions = vec![
             ("p1", [142.0, -13.0, 32.0], 600.0),
             ("p2", [-171.0, 29.0, 151.0], 600.0),
@@ -213,7 +214,7 @@ fn an_error_is_distinguished_from_an_open_beginning() {
         println!("{seed}: {all:?} {:?}", c.records[0].clock);
         named += usize::from(all.iter().any(|n| n == "K0_X"));
     }
-    assert!(named == 12 && open > 2, "{named} {open}");
+    assert!(named == count && open > count / 5, "{named} {open}");
 }
 
 /// Without an error nothing is suspected in these ten records.
