@@ -31,7 +31,8 @@ def functions(text: str) -> Iterator[tuple[int, str]]:
                 if lines[last].startswith(head[1] + "}"):
                     yield last - first + 1, head[2]
                     break
-                if last > first and lines[last].startswith(head[1]) and not lines[last].startswith(head[1] + " ") and lines[last].endswith(";"):
+                own = lines[last].startswith(head[1]) and not lines[last].startswith(head[1] + " ")
+                if own and last > first and lines[last].endswith(";"):
                     break
 
 
@@ -55,7 +56,8 @@ def main() -> None:
         if not file.stem.endswith("tests")
     }
     code = {file: text.split("#[cfg(test)]")[0] for file, text in texts.items()}
-    long = sorted(((n, name, file) for file, text in code.items() for n, name in functions(text) if n > 60), reverse=True)
+    sizes = ((n, name, file) for file, text in code.items() for n, name in functions(text))
+    long = sorted((found for found in sizes if found[0] > 60), reverse=True)
     print("functions of more than 60 lines:", *(f"{n} {name} ({file})" for n, name, file in long), sep="\n  ")
     places: dict[str, set[str]] = defaultdict(set)
     for file, text in code.items():
@@ -66,7 +68,8 @@ def main() -> None:
     for file, text in code.items():
         public[file.parts[1]] += len(PUBLIC.findall(text))
     print("public items:", public.total(), dict(public.most_common()))
-    said = [text for file in root.glob("schemas/*.json") for text in descriptions(json.loads(file.read_text(encoding="utf-8")))]
+    schemas = [json.loads(file.read_text(encoding="utf-8")) for file in root.glob("schemas/*.json")]
+    said = [text for schema in schemas for text in descriptions(schema)]
     print(f"descriptions in schemas: {len(said)}, {sum(len(text) < 26 for text in said)} of fewer than 26 characters")
     print("files of more than 500 lines:", sum(text.count("\n") > 500 for text in texts.values()))
     print("lines:", sum(text.count("\n") for text in texts.values()))
