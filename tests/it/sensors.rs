@@ -6,6 +6,7 @@ use obsdeg_core::system::{
     Candidate, Identifiability, NumberOfSolutions, SystemModel, SystemOptions, analyze_system, json, judge,
     model_file,
 };
+use obsdeg_design::DegreeCap;
 use obsdeg_design::sensors::{FrontSet, SensorError, SensorOptions, SensorSet, Sensors, sensors};
 
 use crate::models::models;
@@ -15,6 +16,10 @@ use crate::program::{refused, run, stderr, stdout};
 const SEED: u64 = 7;
 
 type Degrees = Vec<(String, Option<usize>)>;
+
+fn cap(text: &str) -> DegreeCap {
+    text.parse().expect("a cap")
+}
 
 fn members(set: usize) -> impl Iterator<Item = usize> {
     (0..usize::BITS as usize).filter(move |c| set >> c & 1 == 1)
@@ -470,7 +475,11 @@ fn states_of_the_mapk_cascade() {
         assert!(worst.flatten() >= Some(33), "{c}: {worst:?}");
     }
     // caps on degrees, and queries for one unknown alone
-    let one = SensorOptions { required: vec!["a00".into()], max_degree: vec![(None, 8)], ..options };
+    let one = SensorOptions {
+        required: vec!["a00".into()],
+        max_degree: vec![DegreeCap { name: None, cap: 8 }],
+        ..options
+    };
     let found_one = sensors(&model, &one, &|_| true).expect("sets");
     let least = found.quantities.iter().find(|q| q.name == "a00").expect("an unknown");
     assert!(found_one.front.iter().all(|f| f.degree <= 8) && found_one.required == ["a00"]);
@@ -602,12 +611,12 @@ fn what_cannot_be_is_said() {
     let found = sensors(&model, &options, &|_| true).expect("sets");
     assert_eq!(found.unattainable[0].name, "unused");
     assert_eq!((found.unattainable.len(), found.front.len()), (1, 2));
-    let strict = SensorOptions { max_degree: vec![(Some("k".into()), 0)], ..options.clone() };
+    let strict = SensorOptions { max_degree: vec![cap("k=0")], ..options.clone() };
     let found = sensors(&model, &strict, &|_| true).expect("sets");
     assert_eq!((found.unattainable[0].name.as_str(), found.unattainable[0].degree), ("k", Some(1)));
     assert_eq!(found.max_degree, ["k=0"]);
     // the narrower name holds, in either order
-    let caps = [(None, 0), (Some("k".into()), 1), (Some("unused".into()), 5)];
+    let caps = ["0", "k=1", "unused=5"].map(cap);
     for max_degree in [caps.to_vec(), caps.iter().rev().cloned().collect()] {
         let found =
             sensors(&model, &SensorOptions { max_degree, ..options.clone() }, &|_| true).expect("sets");

@@ -273,6 +273,51 @@ fn no_files_import_each_other() {
     assert_eq!(circle(&imports_of_files(&files)), None);
 }
 
+/// Public fields that may be pairs of numbers or tuples of three: their names say both parts, or they map an
+/// index to another.
+const PAIRS: [&str; 6] = [
+    "core/src/model/path.rs: cos_sin",
+    "core/src/model/platform.rs: cos_sin",
+    "core/src/solution/local.rs: row",
+    "core/src/solution/problem.rs: of",
+    "core/src/system/model/compiled.rs: carry",
+    "core/src/system/model/compiled.rs: constants",
+];
+
+/// Public fields of a file that hold tuples of three or more, or of two numbers of one kind.
+fn fields_without_names(text: &str) -> Vec<String> {
+    let field = Regex::new(r"(?m)^ +pub(?:\([^)]*\))? (\w+): (.*),$").expect("a pattern");
+    let tuple = Regex::new(r"\(((?:[^()]|\([^()]*\))*)\)").expect("a pattern");
+    let has_no_names = |of: &str| {
+        tuple.captures_iter(of).any(|c| {
+            let parts: Vec<&str> = c[1].split(", ").collect();
+            let is_number = |part: &str| ["f64", "u64", "usize", "i64"].contains(&part);
+            parts.len() > 2 || parts.len() == 2 && parts[0] == parts[1] && is_number(parts[0])
+        })
+    };
+    let all = field.captures_iter(text).filter(|c| !c[2].contains("Fn(") && !c[2].contains("fn("));
+    all.filter(|c| has_no_names(&c[2])).map(|c| c[1].into()).collect()
+}
+
+#[test]
+fn parts_of_fields_have_names() {
+    let crates = root().join("crates");
+    let mut found = Vec::new();
+    // the checker of certificates reads files by a reader of its own, which is short
+    let all = sources(&crates).into_iter().filter(|path| !path.starts_with(crates.join("verify")));
+    for path in all.filter(|path| path.components().any(|c| c.as_os_str() == "src")) {
+        let name = path.strip_prefix(&crates).expect("below").display().to_string();
+        let text = fs::read_to_string(&path).expect("readable");
+        found.extend(fields_without_names(&text).into_iter().map(|field| format!("{name}: {field}")));
+    }
+    found.sort();
+    found.dedup();
+    assert_eq!(found, PAIRS);
+    let wrong = "struct A {\n    pub a: (f64, f64),\n    pub b: Vec<(String, f64, String)>,\n    pub(super) c: Vec<Option<(usize, \
+                 usize)>>,\n    pub d: Vec<(usize, f64)>,\n}\n";
+    assert_eq!(fields_without_names(wrong), ["a", "b", "c"]);
+}
+
 /// Largest number of columns of a comment line, including indentation, outside code and formulas between
 /// fences.
 const COLUMNS: usize = 110;

@@ -4,6 +4,8 @@
 
 use std::collections::VecDeque;
 
+use obsdeg_core::span::Span;
+
 /// Mean of one channel at the middle of a bin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
@@ -29,7 +31,7 @@ pub(crate) struct Bin {
     /// Middle of the bin: the mean of its times, in s.
     pub t: f64,
     /// First and last line of the record.
-    pub lines: (u64, u64),
+    pub lines: Span<u64>,
     /// Means by channel; `None` where nothing was measured.
     pub channels: Vec<Option<Mean>>,
     /// Mean temperature; `None` where the record has none.
@@ -144,7 +146,7 @@ impl Binner {
         let channels = (0..self.sigmas.len()).map(|c| self.channel(now, c, t, spikes)).collect();
         let warm: Vec<f64> = now.iter().filter_map(|s| s.temperature).collect();
         let temperature = (!warm.is_empty()).then(|| warm.iter().sum::<f64>() / warm.len() as f64);
-        Some(Bin { t, lines: (first.line, last.line), channels, temperature })
+        Some(Bin { t, lines: Span { from: first.line, to: last.line }, channels, temperature })
     }
 
     fn channel(&mut self, now: &[BinSample], c: usize, t: f64, spikes: &mut Vec<Spike>) -> Option<Mean> {
@@ -258,7 +260,7 @@ mod tests {
     fn alone_and_together() {
         let (alone, _) = binned((0..3).map(|i| sample(i + 2, 10.0 * i as f64, i as f64)));
         assert_eq!(alone.len(), 3);
-        assert_eq!((alone[1].t, alone[1].lines), (10.0, (3, 3)));
+        assert_eq!((alone[1].t, alone[1].lines), (10.0, (3, 3).into()));
         let one = alone[1].channels[0].expect("measured");
         assert_eq!((one.value, one.variance, one.free), (1.0, 1.0, 0));
         let (all, spikes) = binned((0..100).map(|i| sample(i, i as f64 / 10.0, 3.0 + 0.7 * i as f64)));

@@ -11,6 +11,24 @@
 use nalgebra::{DMatrix, DVector, RowDVector};
 use obsdeg_ekf::{EkfError, Stage, Transition};
 
+/// Gap between two parts of a trajectory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrajectoryGap {
+    /// Number of the step before the next part.
+    pub step: usize,
+    /// End of that step in local coordinates of the next part (shape n).
+    pub end: DVector<f64>,
+}
+
+/// Prior information on combinations of unknowns: `rows x = values`, with unit errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PriorRows {
+    /// Combinations (shape m x n), in SI units.
+    pub rows: DMatrix<f64>,
+    /// Values of the combinations (shape m).
+    pub values: DVector<f64>,
+}
+
 /// Run linearised along one trajectory: Phi, Q and output rows of every step ([`Stage`]s of one step), a root
 /// of Q, and the residuals of the measurements along the trajectory.
 #[derive(Debug, Clone, Default)]
@@ -21,10 +39,9 @@ pub struct Linearised {
     pub roots: Vec<DMatrix<f64>>,
     /// Measurement minus output, in the order of the rows.
     pub residuals: Vec<f64>,
-    /// Gaps of a trajectory in parts, in order: the number of the step before the next part, and the end of
-    /// that step in local coordinates of the next part (shape n). States behind a gap are corrections of the
-    /// next part. Empty for a trajectory in one part.
-    pub gaps: Vec<(usize, DVector<f64>)>,
+    /// Gaps of a trajectory in parts, in order. States behind a gap are corrections of the next part. Empty
+    /// for a trajectory in one part.
+    pub gaps: Vec<TrajectoryGap>,
 }
 
 impl Linearised {
@@ -41,7 +58,7 @@ impl Linearised {
         let mut gaps = self.gaps.iter().peekable();
         for (step, stage) in self.stages.iter().enumerate() {
             stage.transition.apply(&mut d, &mut scratch);
-            if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
+            if let Some(TrajectoryGap { end: gap, .. }) = gaps.next_if(|gap| gap.step == step) {
                 d.iter_mut().zip(gap).for_each(|(d, e)| *d += e);
             }
             on_step(step, &d);
@@ -230,7 +247,7 @@ impl StartInformation {
         let mut gaps = run.gaps.iter().rev().peekable();
         for (step, (stage, g)) in run.stages.iter().zip(&run.roots).enumerate().rev() {
             next -= stage.outputs.len();
-            if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
+            if let Some(TrajectoryGap { end: gap, .. }) = gaps.next_if(|gap| gap.step == step) {
                 rows.behind(gap);
             }
             rows.measured(stage, &run.residuals[next..])?;
@@ -281,7 +298,7 @@ impl StartInformation {
                 let root = if both.ncols() > n { both.transpose().qr().r().transpose() } else { both };
                 RunState { correction: &phi * d + g * xi.column(0), root }
             };
-            if let Some((_, gap)) = gaps.next_if(|(at, _)| *at == step) {
+            if let Some(TrajectoryGap { end: gap, .. }) = gaps.next_if(|gap| gap.step == step) {
                 next.correction += gap;
             }
             out.push(next);
@@ -497,7 +514,7 @@ mod tests {
         let run = random_walk();
         let found = StartInformation::of(&run).expect("finite");
         let c = DVector::from_column_slice(&[0.6, -1.1, 0.4]);
-        let mut parted = Linearised { gaps: vec![(4, -&c)], ..run.clone() };
+        let mut parted = Linearised { gaps: vec![TrajectoryGap { step: 4, end: -&c }], ..run.clone() };
         let (phi, mut at) = (phi(), c);
         // step 3 has no measurement
         for row in 4..7 {

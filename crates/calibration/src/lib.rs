@@ -57,5 +57,5 @@ pub enum CalibrationProgress<'a> {
 pub use answer::{Before, Calibration};
 pub use compared::{CalibrationChange, ChangeTest, CoefficientChange, compared};
 pub use platform::{CalibrationError, Options, calibrate};
-pub use setup::{Setup, SourceRecord};
+pub use setup::{Setup, SetupPosition, SourceRecord};
 pub use system::{SystemCalibration, SystemCalibrationError, SystemCalibrationOptions, calibrate_system};

@@ -1,6 +1,7 @@
 //! Subject of a calibration and its records: they prevent numbers of another platform from being used, and
 //! records from counting twice.
 
+use obsdeg_core::json_list;
 use obsdeg_core::model::{Carry, Geometry, Scheme};
 use obsdeg_evidence::simulation::latitude_of;
 use schemars::JsonSchema;
@@ -20,8 +21,19 @@ pub struct Setup {
     /// True if psi_y is measured.
     pub measured_azimuth: bool,
     /// Names and Euler angles in deg of the positions.
-    pub positions: Vec<(String, String)>,
+    pub positions: Vec<SetupPosition>,
 }
+
+/// Position of a setup; in JSON `[name, angles]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SetupPosition {
+    /// Name of the position.
+    pub name: String,
+    /// Euler angles alpha, beta, gamma in deg, as `0,90,0`.
+    pub angles: String,
+}
+
+json_list!(SetupPosition { name: String, angles: String });
 
 impl Setup {
     /// Setup of a scheme.
@@ -35,7 +47,11 @@ impl Setup {
             carry: scheme.carry,
             latitude_deg: latitude_of(scheme).map_or(0.0, |l| l.degrees()),
             measured_azimuth: scheme.measured_azimuth,
-            positions: scheme.positions.iter().map(|p| (p.name.clone(), angles(p))).collect(),
+            positions: scheme
+                .positions
+                .iter()
+                .map(|p| SetupPosition { name: p.name.clone(), angles: angles(p) })
+                .collect(),
         }
     }
 
@@ -55,8 +71,8 @@ impl Setup {
         let count = |s: &Self| s.positions.len().to_string();
         say("number of positions", &count(self), &count(there));
         if self.positions.len() == there.positions.len() {
-            for ((name, here), (_, other)) in self.positions.iter().zip(&there.positions) {
-                say(&format!("angles of {name}"), here, other);
+            for (here, other) in self.positions.iter().zip(&there.positions) {
+                say(&format!("angles of {}", here.name), &here.angles, &other.angles);
             }
         }
         if self.geometry != there.geometry {

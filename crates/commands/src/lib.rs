@@ -45,7 +45,7 @@ pub use call::{Answered, COMMANDS, InJson, Rendered, call, call_allan, call_cali
 pub use compare::{Compare, compare};
 pub use conditions::{ConditionOptions, GyroNoiseOptions, MeasurementOptions, RequirementOptions};
 pub use crosscheck::{Crosscheck, Evidence, crosscheck, files as crosscheck_files};
-pub use design::options::{DegreeCap, Search, SearchFiles, WantedOptions};
+pub use design::options::{Search, SearchFiles, WantedOptions};
 pub use design::{design, is_word};
 pub use designed::{Designed, Searched, SearchedSlewSequence};
 pub use host::{Host, Now};

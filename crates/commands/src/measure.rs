@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use clap::Args;
 use obsdeg_core::model::settings::{Assignment, AssignmentError};
 use obsdeg_core::system::{CANDIDATE_WORDS, Candidate, ModelError, SystemModel, WorkLimit, check_cost};
+use obsdeg_design::DegreeCap;
 use obsdeg_design::sensors::{SensorError, SensorOptions, Sensors, sensors};
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +63,7 @@ pub(crate) struct SetRequirements<'a> {
     /// Unknowns that must be observable; empty: all.
     pub(crate) required: &'a [String],
     /// Largest degree of one unknown; without a name, of all.
-    pub(crate) max_degree: Vec<(Option<String>, usize)>,
+    pub(crate) max_degree: Vec<DegreeCap>,
     pub(crate) keep: usize,
     pub(crate) seed: u64,
 }

@@ -48,6 +48,7 @@ pub mod model;
 pub mod omitted;
 pub mod remedies;
 pub mod solution;
+pub mod span;
 pub mod system;
 pub mod title_block;
 pub mod why;

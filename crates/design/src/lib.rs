@@ -23,3 +23,5 @@ pub mod next;
 pub mod procedure;
 pub mod review;
 pub mod sensors;
+
+pub use degree_caps::DegreeCap;

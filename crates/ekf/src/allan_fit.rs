@@ -130,12 +130,21 @@ fn pair(lengths: &[usize], m: usize, other: usize) -> [[f64; TERMS]; TERMS] {
     out
 }
 
+/// Coefficient of a noise that a record resolves, in the unit of the samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResolvedNoise {
+    /// Coefficient of the noise.
+    pub value: f64,
+    /// Standard deviation of the coefficient.
+    pub sigma: f64,
+}
+
 /// Fit of one noise. Coefficients are in the unit of the samples, with times in samples: N for the mean
 /// over one sample, K for the step from one sample to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermFit {
     /// Coefficient and its standard deviation; `None` where it is not resolved.
-    pub found: Option<(f64, f64)>,
+    pub found: Option<ResolvedNoise>,
     /// Upper limit: the coefficient lies below it with probability [`LIMIT`].
     pub limit: f64,
     /// Smallest coefficient that this record resolves beside the noises that it has.
@@ -332,7 +341,7 @@ pub fn fit(points: &[AllanPoint], lengths: &[usize], confidence: f64) -> Result<
         let others: Vec<usize> = kept.iter().copied().filter(|&l| l != k).collect();
         let (x, sigma) = (solved.x[k], solved.covariance[(k, k)].sqrt());
         Some(TermFit {
-            found: resolved.then(|| (x.sqrt(), sigma / (2.0 * x.sqrt()))),
+            found: resolved.then(|| ResolvedNoise { value: x.sqrt(), sigma: sigma / (2.0 * x.sqrt()) }),
             limit: fitting.limit(&others, &solved, k)?.sqrt(),
             least: (RESOLVED * fitting.without(&others, &solved, k)?).sqrt(),
         })
@@ -445,7 +454,7 @@ mod tests {
                 sizes.map(|m| overlapping_variance(&stretches, m).expect("long enough")).collect();
             let found = fit(&points, &[n], 0.95).expect("a fit");
             for (term, truth) in [(0, 1.0), (2, walk)] {
-                let (x, sigma) = found.terms[term].found.expect("resolved");
+                let ResolvedNoise { value: x, sigma } = found.terms[term].found.expect("resolved");
                 assert!((x - truth).abs() < 4.0 * sigma && sigma < 0.2 * truth, "{n} {term}: {x} {sigma}");
             }
         }
@@ -481,7 +490,7 @@ mod tests {
                 (0..10).filter_map(|k| overlapping_variance(&all, 1 << k)).collect();
             let found = fit(&points, &[samples], 0.95).expect("a fit");
             for ((k, truth), sum) in [(0, 1.0), (2, walk)].into_iter().zip(&mut squares) {
-                let Some((x, sigma)) = found.terms[k].found else {
+                let Some(ResolvedNoise { value: x, sigma }) = found.terms[k].found else {
                     unresolved += 1;
                     continue;
                 };

@@ -1,9 +1,11 @@
 //! Documents, tables and CSV of a calibration from recorded data.
 
 use obsdeg_calibration::Calibration;
+use obsdeg_calibration::answer::HeldUnknown;
 use obsdeg_calibration::answer::{
     Assumed, CovarianceTable, Curvature, Estimated, Gap, NextRun, PositionFit, PositionsBy, RecordReport,
 };
+use obsdeg_core::span::Span;
 
 use crate::calibration_findings::{clock, finding};
 use crate::document::{Document, DocumentBlock, estimate, left, number, optional, right};
@@ -153,8 +155,8 @@ fn records(c: &Calibration) -> Vec<String> {
             "{}: {} samples from {} to {} s, taken together in {} bins; positions by {}",
             r.name,
             r.samples,
-            tenths(r.span_s.0),
-            tenths(r.span_s.1),
+            tenths(r.span_s.from),
+            tenths(r.span_s.to),
             r.bins,
             by_what(r.positions_by)
         );
@@ -282,11 +284,8 @@ fn next_run(n: &NextRun) -> String {
 /// Mode of the estimates: data alone or with stated priors, the unknowns that are left open and their effect,
 /// the curvature.
 fn mode(c: &Calibration) -> Vec<String> {
-    let listed = |of: &[(String, f64, String)]| {
-        of.iter()
-            .map(|(name, width, unit)| format!("{name} {} {unit}", number(*width)))
-            .collect::<Vec<_>>()
-            .join(", ")
+    let listed = |of: &[HeldUnknown]| {
+        of.iter().map(|h| format!("{} {} {}", h.name, number(h.sigma), h.unit)).collect::<Vec<_>>().join(", ")
     };
     let what = if c.curvature.from_samples { "means" } else { "the most probable values" };
     let mut out = vec![if c.assumed.priors.is_empty() {
@@ -363,8 +362,8 @@ fn fit(c: &Calibration) -> Vec<String> {
                 " (measurements less what the estimate takes of them, where random drift takes parts)"
             },
             number(per),
-            f.band.0,
-            f.band.1,
+            f.band.from,
+            f.band.to,
             f.factor.max(1.0),
             if c.assumed.known.is_empty() { "" } else { ", but for what was known before" }
         ),
@@ -381,8 +380,8 @@ fn fit(c: &Calibration) -> Vec<String> {
             "run to run: chi-square {} per degree of freedom on {:.0} (band of 99.9 % {:.3} to {:.3})",
             number(r.chi_square),
             r.degrees_of_freedom,
-            r.band.0,
-            r.band.1
+            r.band.from,
+            r.band.to
         ));
     }
     out
@@ -524,7 +523,8 @@ fn outliers(c: &Calibration) -> Option<DocumentBlock> {
         return None;
     }
     let columns = [left("record"), left("lines"), right("t [s]"), left("component"), right("off by [sigma]")];
-    let lines = |(from, to): (u64, u64)| if from == to { from.to_string() } else { format!("{from}-{to}") };
+    let lines =
+        |Span { from, to }: Span<u64>| if from == to { from.to_string() } else { format!("{from}-{to}") };
     let rows = c.outliers.iter().take(LISTED).map(|o| {
         vec![o.record.clone(), lines(o.lines), number(o.t_s), o.channel.clone(), format!("{:+.1}", o.sigmas)]
     });

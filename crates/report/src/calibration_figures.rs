@@ -3,6 +3,7 @@
 
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{Estimated, PositionFit, ResidualSeries};
+use obsdeg_calibration::answer::{ResidualDeviation, ResidualPoint};
 
 use crate::figure::{BLACK, BLUE, Band, Curve, Figure, FigureError, GREEN, ORANGE, SKY, Stroke, grid};
 use crate::figures::{File, line, picture};
@@ -41,9 +42,9 @@ pub fn calibration_figures(c: &Calibration) -> Result<Vec<File>, FigureError> {
 }
 
 /// Points of a series, split by position: no line crosses a slew.
-fn by_position<'s>(series: &'s ResidualSeries, positions: &[&PositionFit]) -> Vec<&'s [(f64, f64, f64)]> {
+fn by_position<'s>(series: &'s ResidualSeries, positions: &[&PositionFit]) -> Vec<&'s [ResidualPoint]> {
     // ends of positions are rounded to rows of the record, so only their starts decide
-    let place = |p: &(f64, f64, f64)| positions.iter().take_while(|q| q.start_s <= p.0).count();
+    let place = |p: &ResidualPoint| positions.iter().take_while(|q| q.start_s <= p.t_s).count();
     series.points.chunk_by(|a, b| place(a) == place(b)).collect()
 }
 
@@ -52,16 +53,16 @@ pub(crate) fn residual_figure(c: &Calibration, series: &ResidualSeries) -> Figur
     let own: Vec<&PositionFit> = c.positions.iter().filter(|p| p.record == series.record).collect();
     let pieces = by_position(series, &own);
     let all = &series.points;
-    let (first, last) = (all.first().map_or(0.0, |p| p.0), all.last().map_or(1.0, |p| p.0));
-    let largest = all.iter().map(|p| p.1.abs().max(3.0 * p.2)).fold(0.0, f64::max);
+    let (first, last) = (all.first().map_or(0.0, |p| p.t_s), all.last().map_or(1.0, |p| p.t_s));
+    let largest = all.iter().map(|p| p.residual.abs().max(3.0 * p.sigma)).fold(0.0, f64::max);
     let half = if largest > 0.0 { 1.15 * largest } else { 1.0 };
-    let band = |piece: &&[(f64, f64, f64)]| Band {
+    let band = |piece: &&[ResidualPoint]| Band {
         color: SKY,
-        points: piece.iter().map(|p| (p.0, -3.0 * p.2, 3.0 * p.2)).collect(),
+        points: piece.iter().map(|p| (p.t_s, -3.0 * p.sigma, 3.0 * p.sigma)).collect(),
     };
-    let residuals = |(i, piece): (usize, &&[(f64, f64, f64)])| {
+    let residuals = |(i, piece): (usize, &&[ResidualPoint])| {
         let label = if i == 0 { "residual, band of +-3 sigma" } else { "" };
-        line(label, BLUE, Stroke::Solid, piece.iter().map(|p| (p.0, p.1)).collect())
+        line(label, BLUE, Stroke::Solid, piece.iter().map(|p| (p.t_s, p.residual)).collect())
     };
     let zero = line("zero", BLACK, Stroke::Dotted, vec![(first, 0.0), (last, 0.0)]);
     Figure {
@@ -79,14 +80,15 @@ pub(crate) fn residual_figure(c: &Calibration, series: &ResidualSeries) -> Figur
 
 /// The Allan deviation of the residuals of a component, beside that of white noise.
 pub(crate) fn allan_figure(series: &ResidualSeries) -> Figure {
-    let curve = |of: fn(&(f64, f64, f64)) -> f64| series.allan.iter().map(|p| (p.0, 1e6 * of(p))).collect();
+    let curve =
+        |of: fn(&ResidualDeviation) -> f64| series.allan.iter().map(|p| (p.tau_s, 1e6 * of(p))).collect();
     Figure {
         title: format!("{}: Allan deviation", series.channel),
         x_label: "cluster time [s]".into(),
         y_label: format!("deviation [u{}]", series.unit),
         lines: vec![
-            line("residuals", BLUE, Stroke::Solid, curve(|p| p.1)),
-            line("white, of the assumed sigma", BLACK, Stroke::Dotted, curve(|p| p.2)),
+            line("residuals", BLUE, Stroke::Solid, curve(|p| p.deviation)),
+            line("white, of the assumed sigma", BLACK, Stroke::Dotted, curve(|p| p.white)),
         ],
         log: true,
         ..Figure::default()
@@ -231,7 +233,9 @@ mod tests {
             record: "run.csv".into(),
             channel: "Z1".into(),
             unit: "g".into(),
-            points: [0.0, 10.0, 20.0, 40.0, 50.0].map(|t| (t, 1e-6, 1e-6)).to_vec(),
+            points: [0.0, 10.0, 20.0, 40.0, 50.0]
+                .map(|t_s| ResidualPoint { t_s, residual: 1e-6, sigma: 1e-6 })
+                .to_vec(),
             allan: Vec::new(),
             autocorrelation: Vec::new(),
             count: 5,
@@ -239,6 +243,6 @@ mod tests {
         let positions = [position(0.0, 20.0), position(40.0, 60.0)];
         let pieces = by_position(&series, &positions.iter().collect::<Vec<_>>());
         assert_eq!(pieces.iter().map(|p| p.len()).collect::<Vec<_>>(), [3, 2]);
-        assert_eq!(pieces[1][0].0, 40.0);
+        assert_eq!(pieces[1][0].t_s, 40.0);
     }
 }

@@ -3,6 +3,7 @@
 use obsdeg_calibration::answer::{
     CalibrationFinding, CellKind, Clock, ClockRate, ForceCause, ForceError, ForceLength, RecordReport,
 };
+use obsdeg_core::span::Span;
 
 use crate::document::number;
 
@@ -213,7 +214,7 @@ fn force_differs(of: &str, least: &ForceLength, most: &ForceLength, causes: &[Fo
 }
 
 /// Column and lines of cells.
-fn place_of_cells(column: &str, of: &str, (first, last): (u64, u64)) -> String {
+fn place_of_cells(column: &str, of: &str, Span { from: first, to: last }: Span<u64>) -> String {
     let lines = if first == last { format!("line {first}") } else { format!("lines {first} to {last}") };
     format!("column `{column}`{of}, {lines}")
 }
@@ -239,23 +240,23 @@ fn cells(place: &str, kind: CellKind, value: f64, count: usize) -> String {
 }
 
 /// Position, time in s and lines of measurements in succession.
-fn place_of_succession(position: &str, span_s: (f64, f64), lines: (u64, u64)) -> String {
+fn place_of_succession(position: &str, span_s: Span<f64>, lines: Span<u64>) -> String {
     format!(
         "position {position}, {} to {} s, lines {} to {}",
-        number(span_s.0),
-        number(span_s.1),
-        lines.0,
-        lines.1
+        number(span_s.from),
+        number(span_s.to),
+        lines.from,
+        lines.to
     )
 }
 
 /// Sentence on measurements in succession that lie to one side.
-fn succession(count: usize, channel: &str, place: &str, sigmas: (f64, f64)) -> String {
+fn succession(count: usize, channel: &str, place: &str, sigmas: Span<f64>) -> String {
     format!(
         "{count} measurements of {channel} in succession ({place}) lie {:+.1} to {:+.1} sigma off, and were \
          left out: no outliers, but a step of an output at either end of them, or a platform that moved; a \
          step also changes what comes before or after",
-        sigmas.0, sigmas.1
+        sigmas.from, sigmas.to
     )
 }
 

@@ -272,15 +272,23 @@ pub(crate) fn slope_figure(curves: &[&SlopeCurve], unit: &str, first: usize) -> 
     for (i, c) in curves.iter().enumerate() {
         let what = c.accuracy_order.map_or_else(|| "not observable (prior)".into(), |d| format!("order {d}"));
         let (color, stroke) = style(first + i);
-        lines.push(line(format!("{}, {what}", c.name), color, stroke, c.points.clone()));
+        lines.push(line(
+            format!("{}, {what}", c.name),
+            color,
+            stroke,
+            c.points.iter().map(|p| (p.dwell_s, p.sigma)).collect(),
+        ));
         let ends = curves.get(i + 1).is_none_or(|next| next.accuracy_order != c.accuracy_order);
         let Some(d) = c.accuracy_order.filter(|_| ends) else { continue };
         // twice as high as the middle of the first curve of this order
         let Some(of) = curves.iter().find(|of| of.accuracy_order == c.accuracy_order) else { continue };
-        let (t0, s0) = of.points[of.points.len() / 2];
+        let middle = of.points[of.points.len() / 2];
         let slope = -(d as f64 + 0.5);
-        let reference = of.points.iter().map(|&(t, _)| (t, 2.0 * s0 * (t / t0).powf(slope))).collect();
-        lines.push(line(format!("slope {slope:.1}"), BLACK, Stroke::Dotted, reference));
+        let reference = of
+            .points
+            .iter()
+            .map(|p| (p.dwell_s, 2.0 * middle.sigma * (p.dwell_s / middle.dwell_s).powf(slope)));
+        lines.push(line(format!("slope {slope:.1}"), BLACK, Stroke::Dotted, reference.collect()));
     }
     Figure {
         title: format!("Sigma against dwell [{unit}]"),

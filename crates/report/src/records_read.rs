@@ -1,6 +1,7 @@
 //! Report on how records are read, before any estimate.
 
 use obsdeg_calibration::platform::{RecordRead, RecordsRead};
+use obsdeg_core::span::Span;
 
 use crate::Answer;
 use crate::calibration::{by_what, gaps, tenths};
@@ -15,8 +16,8 @@ fn read(r: &RecordRead) -> Vec<String> {
         format!(
             "{} rows from {} to {} s, {} s apart as a rule; {} of them at no position",
             r.samples,
-            tenths(r.span_s.0),
-            tenths(r.span_s.1),
+            tenths(r.span_s.from),
+            tenths(r.span_s.to),
             number(r.interval_s),
             r.unused
         ),
@@ -30,7 +31,7 @@ fn read(r: &RecordRead) -> Vec<String> {
         out.push(format!("columns that are not used: {}", r.ignored.join(", ")));
     }
     out.push(match r.origin_open_s {
-        Some((from, to)) => format!(
+        Some(Span { from, to }) => format!(
             "the scheme begins between {from:.3} and {to:.3} s of the record's clock; calibrate estimates when"
         ),
         None => format!("the timeline begins at {:.3} s of the record's clock", r.origin_s),
@@ -74,7 +75,7 @@ impl Answer for RecordsRead {
             if !r.left_out.is_empty() {
                 let columns = [left("lines"), left("column"), right("value"), left("why")];
                 let rows = r.left_out.iter().take(LISTED).map(|c| {
-                    let (from, to) = c.lines;
+                    let Span { from, to } = c.lines;
                     let lines = if from == to { from.to_string() } else { format!("{from}-{to}") };
                     vec![lines, c.column.clone(), c.value.to_string(), c.why.to_string()]
                 });

@@ -1,6 +1,7 @@
 //! Noise of sensors by the Allan deviation of a static record.
 
 use obsdeg_calibration::noise::{ColumnNoise, NoiseCoefficient, SensorNoiseReport};
+use obsdeg_core::span::Span;
 
 use crate::calibration::tenths;
 use crate::document::{Document, DocumentBlock, left, number, right};
@@ -42,7 +43,7 @@ fn resolved(c: &ColumnNoise) -> String {
 
 /// Statements on the record and the fits.
 fn statements(r: &SensorNoiseReport) -> Vec<String> {
-    let (from, to) = r.span_s;
+    let Span { from, to } = r.span_s;
     let mut out = vec![format!(
         "{} rows from {} to {} s, {} s apart; {} gap{}; other intervals differ by up to {} %.",
         r.samples,

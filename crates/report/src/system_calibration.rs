@@ -1,5 +1,6 @@
 //! A calibration of any system.
 
+use obsdeg_calibration::system::TriedStarts;
 use obsdeg_calibration::system::{
     OtherSolution, OtherStarts, OutputFit, Profile, StatesStart, SystemCalibration, SystemEstimated,
     SystemFinding,
@@ -134,22 +135,24 @@ fn fit(c: &SystemCalibration) -> Vec<String> {
         number(c.chi_square),
         c.degrees_of_freedom,
         number(per),
-        c.band.0,
-        c.band.1
+        c.band.from,
+        c.band.to
     )];
-    if c.starts.0 < c.starts_at_most {
+    if c.starts.tried < c.starts_at_most {
         out.push(format!(
             "{} of {} starts were made: no other solution was to be expected by then (Boender and \
              Rinnooy Kan 1987)",
-            c.starts.0, c.starts_at_most
+            c.starts.tried, c.starts_at_most
         ));
     }
     out.push(match c.starts {
-        (of, led) if c.others.is_empty() => {
-            format!("{led} of {of} starts led to this solution; no other that fits nearly as well was found")
+        TriedStarts { tried, led } if c.others.is_empty() => {
+            format!(
+                "{led} of {tried} starts led to this solution; no other that fits nearly as well was found"
+            )
         }
-        (of, led) => {
-            format!("{led} of {of} starts led to this solution; OTHERS fit nearly as well, see below")
+        TriedStarts { tried, led } => {
+            format!("{led} of {tried} starts led to this solution; OTHERS fit nearly as well, see below")
         }
     });
     out.extend(other_starts(&c.other_starts));
@@ -207,7 +210,7 @@ fn profile(p: &Profile) -> DocumentBlock {
     DocumentBlock::table(
         format!("Profile of {}{flat}", p.name),
         [right("value"), right("chi-square more")],
-        p.points.iter().map(|(x, c)| vec![number(*x), number(*c)]),
+        p.points.iter().map(|p| vec![number(p.value), number(p.rise)]),
     )
 }
 

@@ -72,9 +72,9 @@ fn the_papers_case_is_consistent() {
     let statistic =
         |name: &str| c.monte_carlo.statistics.iter().find(|s| s.name.starts_with(name)).expect("there");
     let all = statistic("ANEES, 15");
-    assert!((all.band.0 - 14.25).abs() < 0.01 && (all.band.1 - 15.77).abs() < 0.01);
+    assert!((all.band.from - 14.25).abs() < 0.01 && (all.band.to - 15.77).abs() < 0.01);
     for s in &c.monte_carlo.statistics {
-        assert!(s.measured >= s.band.0 && s.measured <= s.band.1, "{s:?}");
+        assert!(s.measured >= s.band.from && s.measured <= s.band.to, "{s:?}");
     }
     assert_eq!(statistic("ANEES, observable").expected, 8.0);
     assert!(

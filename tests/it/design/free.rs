@@ -136,10 +136,9 @@ impl DesignPair {
         assert!(every.weights.len() == 10 || every.lighter == 0 && every.weights.len() < 10, "{task}");
         let all = &self.every.support;
         let angles: Vec<String> =
-            all.iter().map(|(e, _)| e.each_ref().map(ToString::to_string).join(",")).collect();
-        let sum: f64 = all.iter().map(|(_, weight)| weight).sum();
-        let times: Vec<f64> =
-            all.iter().map(|(_, weight)| weight / sum * first.angles.len() as f64).collect();
+            all.iter().map(|a| a.angles.each_ref().map(ToString::to_string).join(",")).collect();
+        let sum: f64 = all.iter().map(|a| a.weight).sum();
+        let times: Vec<f64> = all.iter().map(|a| a.weight / sum * first.angles.len() as f64).collect();
         let weights = reaches(of_coefficients.value(&angles, &times), self.every.attained, 1e-3);
         // the search starts from the same attitudes in another order: both values lie between the bounds of
         // both

@@ -2,6 +2,7 @@
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Angle, Carry, Euler, Scheme, c_n_f64, cardinal, parse_attitude};
+use obsdeg_design::DegreeCap;
 use obsdeg_design::design::{
     AttitudeRows, CandidateSymmetry, Candidates, Constraints, Criterion, CriterionName, Design, DesignError,
     DesignOptions, Evaluator, SequenceSearch, SigmaLimits, Stop, design,
@@ -81,10 +82,11 @@ fn task(seed: u64) -> Task {
     };
     let slews = 180.0 / conditions.slew_rate_deg_s.unwrap_or(f64::INFINITY);
     let some = |rng: &mut SplitMix64| rng.below(4) == 0;
+    let cap = |name: &str, cap: usize| DegreeCap { name: Some(name.into()), cap };
     let degree_caps = match rng.below(8) {
-        0 => vec![(None, 1)],
-        1 => vec![(Some(pick(rng, &required).to_string()), 1)],
-        2 => vec![(Some(pick(rng, &required).to_string()), 1), (Some(required[0].to_string()), 2)],
+        0 => vec![DegreeCap { name: None, cap: 1 }],
+        1 => vec![cap(pick(rng, &required), 1)],
+        2 => vec![cap(pick(rng, &required), 1), cap(required[0], 2)],
         _ => Vec::new(),
     };
     let meet = some(rng);
@@ -177,7 +179,7 @@ fn prepared(t: &Task) -> (EvaluatedTask, Vec<usize>, Vec<f64>) {
         .iter()
         .map(|&c| {
             let mut cap = usize::MAX;
-            for (name, k) in &t.options.degree_caps {
+            for DegreeCap { name, cap: k } in &t.options.degree_caps {
                 if name.as_ref().is_none_or(|n| NAMES[c].starts_with(n.as_str())) {
                     cap = *k;
                 }

@@ -3,6 +3,7 @@
 use obsdeg_core::analysis::{AnalysisOptions, analyze};
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Scheme, cardinal};
+use obsdeg_design::DegreeCap;
 use obsdeg_design::design::{
     AttitudeRows, CandidateSymmetry, Candidates, Constraints, Criterion, CriterionName, DesignError,
     DesignOptions, Progress, SequenceSearch, design,
@@ -283,8 +284,11 @@ fn constraints_are_kept() {
     }
     let ones = designed(Carry::Platform, &DesignOptions { candidates: few.clone(), ..six });
     assert!(ones.found.iter().all(|f| f.worst_degree == 1) && ones.required.len() == 9);
-    let capped =
-        DesignOptions { candidates: few, degree_caps: vec![(Some("D_I".into()), 1)], ..options(Some(5)) };
+    let capped = DesignOptions {
+        candidates: few,
+        degree_caps: vec![DegreeCap { name: Some("D_I".into()), cap: 1 }],
+        ..options(Some(5))
+    };
     let error = design(&base(Carry::Platform), &quiet(), &capped, &on).expect_err("the lemma forbids it");
     assert!(matches!(error, DesignError::Impossible { .. }), "{error}");
     // the result meets the requirements, and its margin says so

@@ -124,7 +124,7 @@ fn weights_over_all_attitudes_are_reported_once() {
     let evaluator = Evaluator::new(&base, &candidates.attitudes, &(0..12).collect::<Vec<_>>(), &quiet());
     let every = evaluator.expect("an evaluator").everywhere(&Criterion::D, 17, &|| true).expect("a bound");
     let degrees = |e: &Euler| e.each_ref().map(|a| a.degrees().expect("a number"));
-    let angles: Vec<[f64; 3]> = every.support.iter().map(|(e, _)| degrees(e)).collect();
+    let angles: Vec<[f64; 3]> = every.support.iter().map(|a| degrees(&a.angles)).collect();
     for [alpha, beta, gamma] in &angles {
         assert!(beta.abs() <= 90.0, "{beta}");
         assert!([alpha, gamma].iter().all(|x| **x > -180.0 && **x <= 180.0), "{alpha} {gamma}");
@@ -134,13 +134,13 @@ fn weights_over_all_attitudes_are_reported_once() {
             assert!((attitude(*one) - attitude(*other)).norm() > 1e-4, "{one:?} {other:?}");
         }
     }
-    assert!(every.support.windows(2).all(|w| w[0].1 >= w[1].1));
-    let sum: f64 = every.support.iter().map(|(_, w)| w).sum();
+    assert!(every.support.windows(2).all(|w| w[0].weight >= w[1].weight));
+    let sum: f64 = every.support.iter().map(|a| a.weight).sum();
     assert!((sum - 1.0).abs() < 0.02, "{sum}");
     let c = quiet();
     let oracle = Oracle::new((45.0, c.dwell_s, c.step_s, c.accelerometer_noise_g), &angles, "FIOS");
     let weighed: Vec<(usize, f64)> =
-        every.support.iter().enumerate().map(|(i, (_, w))| (i, 17.0 * w / sum)).collect();
+        every.support.iter().enumerate().map(|(i, a)| (i, 17.0 * a.weight / sum)).collect();
     let reached = oracle.weighed(&weighed, &(0..12).collect::<Vec<_>>(), &Criterion::D).expect("a criterion");
     assert!((reached / every.attained - 1.0).abs() < 1e-4, "{reached} {}", every.attained);
     // an answer lists the heaviest weights and counts the others

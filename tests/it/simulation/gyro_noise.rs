@@ -181,7 +181,7 @@ fn states_in_filter_and_truth(runs: usize) {
         );
         assert!(right.iter().all(|s| s.pass), "{name}: {right:?}");
         let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme, runs);
-        assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
+        assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.to), "{name}: {wrong:?}");
     }
 }
 
@@ -222,7 +222,7 @@ fn biases_of_the_accelerometers(runs: usize) {
         );
         assert!(right.iter().all(|s| s.pass), "{name}: {right:?}");
         let wrong = statistics(&conditions.clone().without_drift_noise(), &conditions, scheme, runs);
-        assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.1), "{name}: {wrong:?}");
+        assert!(wrong.iter().all(|s| s.measured > 2.0 * s.wide_band.to), "{name}: {wrong:?}");
     }
     // a filter with full attitudes has the same sigmas for small psi and drifts, and consistent innovations
     let small = Conditions {

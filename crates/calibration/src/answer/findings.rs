@@ -1,5 +1,6 @@
 //! Findings of a calibration: evidence against the model, the record or the stated sigmas.
 
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::omitted::{ChangePerUnit, Suspicion};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -45,7 +46,7 @@ pub enum CalibrationFinding {
         /// Number of cells that hold the value.
         count: usize,
         /// First and last line number of these cells in the record.
-        lines: (u64, u64),
+        lines: Span<u64>,
     },
     /// Measurements in succession that lie off to the same side; they were left out. Outliers are independent
     /// of each other: these are a step of an output, or the platform moved.
@@ -59,11 +60,11 @@ pub enum CalibrationFinding {
         /// Number of these measurements.
         count: usize,
         /// First and last line number in the record.
-        lines: (u64, u64),
+        lines: Span<u64>,
         /// Times of the first and the last one, in s of the record's timeline.
-        span_s: (f64, f64),
+        span_s: Span<f64>,
         /// Least and largest distance from the expected value, in standard deviations (dimensionless).
-        sigmas: (f64, f64),
+        sigmas: Span<f64>,
     },
     /// Record with the noise of another one: a copy, whose numbers count twice.
     Copy {

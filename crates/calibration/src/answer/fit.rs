@@ -1,6 +1,7 @@
 //! Estimates of a calibration, further runs, and the quality of the fit.
 
 use obsdeg_core::degree::Status;
+use obsdeg_core::span::Span;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -155,7 +156,7 @@ pub struct Fit {
     /// Number of degrees of freedom of chi-square; fractions occur.
     pub degrees_of_freedom: f64,
     /// Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless.
-    pub band: (f64, f64),
+    pub band: Span<f64>,
     /// Factor to multiply sigmas by: the root of chi-square per degree of freedom, dimensionless.
     pub factor: f64,
     /// Number of linearisations until convergence.
@@ -253,7 +254,7 @@ pub struct Outlier {
     /// Name of the record with the outlier.
     pub record: String,
     /// First and last line number of the measurement in the record.
-    pub lines: (u64, u64),
+    pub lines: Span<u64>,
     /// Time of the measurement, in s of the record's timeline.
     pub t_s: f64,
     /// Component of Z (`Z1`, `Z2`, `Z3` or `Za`) or, for a single cell, the column of the record.
@@ -279,5 +280,5 @@ pub struct Repeatability {
     /// Number of degrees of freedom of chi-square; fractions occur.
     pub degrees_of_freedom: f64,
     /// Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless.
-    pub band: (f64, f64),
+    pub band: Span<f64>,
 }

@@ -21,7 +21,8 @@ pub use fit::{
     Repeatability, SecondPath, Warmth,
 };
 pub use records::{
-    Assumed, Clock, ClockRate, EmptyCells, Gap, PositionsBy, RecordReport, Residual, ResidualSeries,
+    Assumed, Clock, ClockRate, ColumnRead, EmptyCells, Gap, HeldUnknown, PositionsBy, RecordReport, Residual,
+    ResidualDeviation, ResidualPoint, ResidualSeries,
 };
 
 /// Name and version of the JSON layout.

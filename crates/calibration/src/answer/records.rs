@@ -1,5 +1,7 @@
 //! Records of a calibration as read, assumed values, and residuals over time.
 
+use obsdeg_core::json_list;
+use obsdeg_core::span::Span;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +35,7 @@ pub struct RecordReport {
     /// Number of bins of the samples.
     pub bins: usize,
     /// First and last time of the record, in s.
-    pub span_s: (f64, f64),
+    pub span_s: Span<f64>,
     /// Source of the position of each sample.
     pub positions_by: PositionsBy,
     /// Longest interval, in s, in which a change of position may lie by the rows beside it: its time is
@@ -154,11 +156,11 @@ pub struct Assumed {
     /// Priors that the estimates hold as stated: name of the unknown, standard deviation in its unit, and
     /// that unit. Empty: estimates by the data alone.
     #[serde(default)]
-    pub priors: Vec<(String, f64, String)>,
+    pub priors: Vec<HeldUnknown>,
     /// Box of what the records leave open: name of the unknown, one standard deviation in its unit, and that
     /// unit.
     #[serde(rename = "held")]
-    pub constrained: Vec<(String, f64, String)>,
+    pub constrained: Vec<HeldUnknown>,
     /// Keys of the conditions that nobody states, so that the program chose them: latitude_deg,
     /// accelerometer_noise_g, drift_noise.
     #[serde(default)]
@@ -178,15 +180,63 @@ pub struct ResidualSeries {
     pub unit: String,
     /// Time in s, residual and its sigma by the assumed noise in the unit of `unit`: at most a thousand
     /// points, evenly picked.
-    pub points: Vec<(f64, f64, f64)>,
+    pub points: Vec<ResidualPoint>,
     /// Correlation of the residuals with those one, two, ... measurements later, dimensionless.
     pub autocorrelation: Vec<f64>,
     /// Number of residuals, listed here or not.
     pub count: usize,
     /// Cluster time in s, overlapping Allan deviation of the residuals (IEEE Std 952-1997, C.1), and that of
     /// white residuals of the assumed sigma, both in the unit of `unit`; slews take no time here.
-    pub allan: Vec<(f64, f64, f64)>,
+    pub allan: Vec<ResidualDeviation>,
 }
+
+/// A column that is used.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ColumnRead {
+    /// The header, as it is written.
+    pub column: String,
+    /// Factor from the unit of the column to s, g, g s (increments of velocity), rad or degC.
+    pub factor: f64,
+}
+
+/// Unknown that a standard deviation holds; in JSON `[name, sigma, unit]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldUnknown {
+    /// Name of the unknown.
+    pub name: String,
+    /// Standard deviation, in `unit`.
+    pub sigma: f64,
+    /// Unit of the standard deviation.
+    pub unit: String,
+}
+
+json_list!(HeldUnknown { name: String, sigma: f64, unit: String });
+
+/// Residual with its time; in JSON `[t_s, residual, sigma]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResidualPoint {
+    /// Time of the measurement, in s.
+    pub t_s: f64,
+    /// Residual, in the unit of its series.
+    pub residual: f64,
+    /// Standard deviation of the residual by the assumed noise, in the same unit.
+    pub sigma: f64,
+}
+
+json_list!(ResidualPoint { t_s: f64, residual: f64, sigma: f64 });
+
+/// Allan deviation of residuals; in JSON `[tau_s, deviation, white]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResidualDeviation {
+    /// Cluster time, in s.
+    pub tau_s: f64,
+    /// Overlapping Allan deviation of the residuals, in the unit of their series.
+    pub deviation: f64,
+    /// Allan deviation of white residuals of the assumed sigma, in the same unit.
+    pub white: f64,
+}
+
+json_list!(ResidualDeviation { tau_s: f64, deviation: f64, white: f64 });
 
 /// Residual of one measurement.
 #[derive(Debug, Clone, PartialEq)]

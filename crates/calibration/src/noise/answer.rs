@@ -1,5 +1,6 @@
 //! Noise of the sensors of a static record, as plain data.
 
+use obsdeg_core::span::Span;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ pub struct SensorNoiseReport {
     /// Number of rows of the record.
     pub samples: usize,
     /// First and last time of the record, in s.
-    pub span_s: (f64, f64),
+    pub span_s: Span<f64>,
     /// Usual interval between rows, in s.
     pub interval_s: f64,
     /// Number of gaps: intervals between rows of more than one and a half usual ones, or less than half of

@@ -235,8 +235,8 @@ fn coefficients(found: &NoiseFit, sensor: SensorKind, dt: f64) -> Vec<NoiseCoeff
             name: name.into(),
             unit: unit.into(),
             resolved: term.found.is_some(),
-            value: term.found.map(|(x, _)| x * scale),
-            sigma: term.found.map(|(_, s)| s * scale),
+            value: term.found.map(|f| f.value * scale),
+            sigma: term.found.map(|f| f.sigma * scale),
             limit: term.limit * scale,
             least_resolved: term.least * scale,
         }

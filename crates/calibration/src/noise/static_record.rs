@@ -1,5 +1,7 @@
 //! Static record: time, and columns of gyros and accelerometers, in stretches of evenly spaced samples.
 
+use obsdeg_core::span::Span;
+
 use super::answer::SensorKind;
 use super::{NoiseError, NoiseOptions};
 use crate::CalibrationProgress;
@@ -45,7 +47,7 @@ pub(super) struct Channel {
 pub(super) struct StaticRecord {
     pub name: String,
     pub samples: usize,
-    pub span_s: (f64, f64),
+    pub span_s: Span<f64>,
     pub interval_s: f64,
     pub gaps: usize,
     pub jitter: f64,
@@ -114,9 +116,9 @@ impl StaticRecord {
         let (mut times, mut lines) = (Vec::new(), Vec::new());
         let mut values = vec![Vec::new(); columns.len()];
         record.read(&wanted, None, false, |row| -> Result<(), NoiseError> {
-            times.extend(row.numbers[0]);
+            times.extend(row.time());
             lines.push(row.line);
-            for (values, number) in values.iter_mut().zip(&row.numbers[1..]) {
+            for (values, number) in values.iter_mut().zip(row.values()) {
                 values.push(number.unwrap_or(f64::NAN));
             }
             if times.len() * wanted.len() > MOST_NUMBERS {
@@ -141,7 +143,7 @@ impl StaticRecord {
         Ok(Self {
             name: name.clone(),
             samples: times.len(),
-            span_s: (times[0], times[times.len() - 1]),
+            span_s: Span { from: times[0], to: times[times.len() - 1] },
             interval_s,
             gaps: begins.len(),
             jitter,

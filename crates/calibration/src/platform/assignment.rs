@@ -3,19 +3,20 @@
 use std::cmp::Ordering;
 
 use obsdeg_core::model::{AZIMUTH, Matrix3};
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use super::CalibrationError;
 use super::clock::bounds;
 use super::force::Forces;
-use super::gross;
+use super::gross::{self, GrossReason, LeftOutCell};
 use super::mistaken::Mistaken;
 use super::placed::{By, Reading, channel_name};
-use super::record_columns::{ObservedColumns, RecordColumns};
+use super::record_columns::{OBSERVED, ObservedColumns, RecordColumns};
 use super::timeline::Intervals;
 use crate::bins::{Bin, BinSample, Binner, CHANNELS, FEWEST, Spike};
 use crate::levels;
-use crate::record::{Record, RecordRow};
+use crate::record::{Record, RecordRow, TIME_INDEX};
 use crate::still::{DecidedSample, Detector};
 
 /// Ratio to the interval before from which an interval is a gap, in which increments may be lost.
@@ -134,7 +135,7 @@ impl<'a> SampleAssignment<'a> {
             samples: Vec::new(),
             rows: vec![Vec::new(); positions],
             empty: vec![0; layout.wanted.len()],
-            starts: bounds(plan).into_iter().map(|b| b.0).collect(),
+            starts: bounds(plan).into_iter().map(|b| b.from).collect(),
             numbers: Vec::new(),
             gimbals: None,
         }
@@ -188,11 +189,11 @@ impl<'a> SampleAssignment<'a> {
     /// # Errors
     /// [`CalibrationError`].
     pub(super) fn take(&mut self, row: &RecordRow<'_>) -> Result<(), CalibrationError> {
-        let Some(time) = row.numbers[0] else { return Ok(()) };
+        let Some(time) = row.time() else { return Ok(()) };
         if self.out.samples == 0 {
-            self.out.span.0 = time;
+            self.out.span.from = time;
         }
-        self.out.span.1 = time;
+        self.out.span.to = time;
         self.out.samples += 1;
         let mut numbers = std::mem::take(&mut self.numbers);
         numbers.clear();
@@ -204,7 +205,7 @@ impl<'a> SampleAssignment<'a> {
         }
         if let Some(mut detector) = self.detector.take() {
             // a row without forces shows no rest
-            if let [Some(x), Some(y), Some(z)] = numbers[1..4] {
+            if let [Some(x), Some(y), Some(z)] = numbers[OBSERVED] {
                 let mut decided = std::mem::take(&mut self.decided);
                 detector.push(time, vec![x, y, z], (row.line, numbers.clone(), dt), &mut decided);
                 decided.drain(..).try_for_each(|one| self.at_rest(&one))?;
@@ -251,7 +252,7 @@ impl<'a> SampleAssignment<'a> {
     /// # Errors
     /// [`CalibrationError`].
     pub(super) fn at_rest(&mut self, decided: &DecidedSample<Kept>) -> Result<(), CalibrationError> {
-        let Some(time) = decided.sample.1[0] else { return Ok(()) };
+        let Some(time) = decided.sample.1[TIME_INDEX] else { return Ok(()) };
         if let Some(k) = decided.interval {
             if k == self.rests.len() {
                 self.rests.push((time, time));
@@ -287,7 +288,7 @@ impl<'a> SampleAssignment<'a> {
         let numbers = match self.waits(p, t) {
             true => {
                 self.out.waiting += 1;
-                waiting = std::iter::once(numbers[0]).chain(numbers[1..].iter().map(|_| None)).collect();
+                waiting = numbers.iter().enumerate().map(|(i, x)| x.filter(|_| i == TIME_INDEX)).collect();
                 &waiting[..]
             }
             false => numbers,
@@ -307,7 +308,7 @@ impl<'a> SampleAssignment<'a> {
         // f = Z - g points down
         let over = in_n[1].is_some_and(|z| z < -1.0);
         let values =
-            std::array::from_fn(|i| numbers[i + 1].filter(|_| self.layout.own(i)).unwrap_or(f64::NAN));
+            std::array::from_fn(|i| numbers[OBSERVED][i].filter(|_| self.layout.own(i)).unwrap_or(f64::NAN));
         self.samples.push(SampleRow { line, t, values, over });
         if !self.waits(p, t) {
             for (count, number) in self.empty.iter_mut().zip(numbers) {
@@ -336,12 +337,12 @@ impl<'a> SampleAssignment<'a> {
         if self.now != Some(p) {
             // the timeline may begin late, or leave positions out
             while self.out.stays.len() <= p {
-                self.out.stays.push((t, t));
+                self.out.stays.push(Span { from: t, to: t });
                 self.out.after.push(f64::INFINITY);
             }
         }
         self.now = Some(p);
-        self.out.stays[p].1 = t;
+        self.out.stays[p].to = t;
         t
     }
 
@@ -416,7 +417,7 @@ impl<'a> SampleAssignment<'a> {
     fn waits(&self, p: usize, t: f64) -> bool {
         let Some(settle) = self.plan.platform.scheme().recording.settle else { return false };
         match self.out.by.own_time() {
-            true => t - self.out.stays[p].0 < settle - ROUNDING_S,
+            true => t - self.out.stays[p].from < settle - ROUNDING_S,
             false => t - self.starts[p] <= settle + ROUNDING_S,
         }
     }
@@ -434,7 +435,7 @@ impl<'a> SampleAssignment<'a> {
     /// Adds a bin of a position. Its spikes are among those from index `spikes` on; each is replaced by a
     /// cell in the column that is farthest off.
     fn put_bin(&mut self, p: usize, bin: Bin, spikes: usize) {
-        let own = self.samples.partition_point(|s| s.line <= bin.lines.1);
+        let own = self.samples.partition_point(|s| s.line <= bin.lines.to);
         let samples: Vec<SampleRow> = self.samples.drain(..own).collect();
         let over = samples.iter().filter(|s| s.over).count();
         let index = self.out.bins[p].len();
@@ -443,7 +444,7 @@ impl<'a> SampleAssignment<'a> {
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return };
         if samples.len() < FEWEST {
             let row = |s: &SampleRow| gross::MedianRow {
-                lines: (s.line, s.line),
+                lines: Span { from: s.line, to: s.line },
                 t: s.t,
                 samples: 1,
                 values: s.values,
@@ -457,10 +458,10 @@ impl<'a> SampleAssignment<'a> {
         let usual: [f64; 3] = std::array::from_fn(|i| {
             gross::median(some.clone().map(|s| s.values[i]).filter(|x| x.is_finite()).collect())
         });
-        let lines = (first.line, last.line);
+        let lines = Span { from: first.line, to: last.line };
         let t = gross::median(some.map(|s| s.t).collect());
         self.rows[p].push(gross::MedianRow { lines, t, samples: samples.len(), values: usual, bin: index });
-        let inside = |s: &Spike| (lines.0..=lines.1).contains(&s.line);
+        let inside = |s: &Spike| lines.contains(&s.line);
         let (found, others): (Vec<Spike>, Vec<Spike>) = self.out.spikes.drain(spikes..).partition(inside);
         self.out.spikes.extend(others);
         self.put_spikes(found, &samples, &usual);
@@ -483,20 +484,21 @@ impl<'a> SampleAssignment<'a> {
             };
             self.cell(gross::GrossCell {
                 row: None,
-                lines: (spike.line, spike.line),
+                lines: Span { from: spike.line, to: spike.line },
                 t: spike.t,
                 axis,
                 value: s.values[axis],
                 sigmas: spike.sigmas,
-                why: gross::GrossReason::Far,
+                why: GrossReason::Far,
             });
         }
     }
 
     /// Adds a cell that is left out, with its value as written in the record.
     fn cell(&mut self, mut cell: gross::GrossCell) {
-        cell.value /= self.layout.wanted[cell.axis + 1].scale;
-        self.out.cells.push((cell.clone(), self.layout.columns[cell.axis].clone()));
+        cell.value /= self.layout.wanted[OBSERVED][cell.axis].scale;
+        let column = self.layout.columns[cell.axis].clone();
+        self.out.cells.push(LeftOutCell { cell, column });
     }
 
     /// Checks for outputs that hold one value through a position.
@@ -504,9 +506,9 @@ impl<'a> SampleAssignment<'a> {
         let Some((p, axis, value)) = gross::held(&self.rows) else { return Ok(()) };
         Err(Box::new(Mistaken::Held {
             record: self.out.name.clone(),
-            line: self.rows[p][0].lines.0,
+            line: self.rows[p][0].lines.from,
             column: self.layout.columns[axis].clone(),
-            value: (value / self.layout.wanted[axis + 1].scale).to_string(),
+            value: (value / self.layout.wanted[OBSERVED][axis].scale).to_string(),
             rows: self.rows[p].iter().map(|r| r.samples).sum(),
             position: self.plan.platform.scheme().positions[p].name.clone(),
         }))
@@ -533,12 +535,11 @@ impl<'a> SampleAssignment<'a> {
             found.into_iter().for_each(|cell| self.cell(cell));
         }
         // a value far from its neighbours that occurs several times in the record is a code too
-        let all: Vec<(usize, f64)> = self.out.cells.iter().map(|(c, _)| (c.axis, c.value)).collect();
+        let all: Vec<(usize, f64)> = self.out.cells.iter().map(|c| (c.cell.axis, c.cell.value)).collect();
         let again = |c: &gross::GrossCell| all.iter().filter(|a| **a == (c.axis, c.value)).count() > 1;
-        for (cell, _) in
-            self.out.cells.iter_mut().filter(|(c, _)| c.why == gross::GrossReason::Far && again(c))
-        {
-            cell.why = gross::GrossReason::Code;
+        let far = |c: &&mut LeftOutCell| c.cell.why == GrossReason::Far;
+        for left_out in self.out.cells.iter_mut().filter(far).filter(|c| again(&c.cell)) {
+            left_out.cell.why = GrossReason::Code;
         }
     }
 }

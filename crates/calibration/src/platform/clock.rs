@@ -1,5 +1,6 @@
 //! Clock of a record, checked by the times at which positions begin and end, compared with the scheme.
 
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::{Plan, SegmentKind};
 
 use crate::answer::ClockRate;
@@ -46,13 +47,13 @@ pub(crate) fn words(fast: f64) -> String {
 }
 
 /// Begin and end of every position of the scheme, in s.
-pub(crate) fn bounds(plan: &Plan) -> Vec<(f64, f64)> {
-    let mut out: Vec<(f64, f64)> = Vec::new();
+pub(crate) fn bounds(plan: &Plan) -> Vec<Span<f64>> {
+    let mut out: Vec<Span<f64>> = Vec::new();
     for s in plan.segments.iter().filter(|s| !matches!(s.kind, SegmentKind::Slew(_))) {
         let end = s.start_s + s.dt * s.steps as f64;
         match out.get_mut(s.position) {
-            Some(bound) => bound.1 = end,
-            None => out.push((s.start_s, end)),
+            Some(bound) => bound.to = end,
+            None => out.push(Span { from: s.start_s, to: end }),
         }
     }
     out
@@ -63,15 +64,15 @@ pub(crate) fn bounds(plan: &Plan) -> Vec<(f64, f64)> {
 /// clock explains the positions and a right one does not: by far or, for `inside`, with the least and the
 /// largest rate by which all rows lie inside their positions. A common delay of begins or ends has no effect.
 pub(crate) fn by_durations(
-    stays: &[(f64, f64)],
+    stays: &[Span<f64>],
     between: f64,
     plan: &Plan,
-    inside: Option<(f64, f64)>,
+    inside: Option<Span<f64>>,
 ) -> Option<ClockRate> {
     let bounds = bounds(plan);
     let each = bounds.iter().zip(stays);
     let points: Vec<(f64, f64)> =
-        each.flat_map(|(scheme, stay)| [(scheme.0, stay.0), (scheme.1, stay.1)]).collect();
+        each.flat_map(|(scheme, stay)| [(scheme.from, stay.from), (scheme.to, stay.to)]).collect();
     let line = line(&points)?;
     let whole = points.last()?.0 - points.first()?.0;
     let explains = line.within <= SIGNIFICANT / 2.0 * between;
@@ -79,8 +80,7 @@ pub(crate) fn by_durations(
     let sigma = of(between) * line.sigma;
     let far =
         || (line.fast.abs() * whole > SIGNIFICANT * between).then_some(ClockRate { fast: line.fast, sigma });
-    let middle =
-        |(low, high): (f64, f64)| ClockRate { fast: (low + high) / 2.0, sigma: sigma.max(of(high - low)) };
+    let middle = |rates: Span<f64>| ClockRate { fast: rates.middle(), sigma: sigma.max(of(rates.length())) };
     if explains { inside.map(middle).or_else(far) } else { None }
 }
 
@@ -88,8 +88,8 @@ pub(crate) fn by_durations(
 /// positions `stays` (begin and end) over the durations of the slews. `between` is the time between two
 /// samples, in s. `None` unless such a factor explains these times and one does not; a common time to settle
 /// has no effect.
-pub(crate) fn of_turns(stays: &[(f64, f64)], between: f64, slews: &[f64]) -> Option<f64> {
-    let each = (1..stays.len()).map(|p| (slews[p], stays[p].0 - stays[p - 1].1));
+pub(crate) fn of_turns(stays: &[Span<f64>], between: f64, slews: &[f64]) -> Option<f64> {
+    let each = (1..stays.len()).map(|p| (slews[p], stays[p].from - stays[p - 1].to));
     let points: Vec<(f64, f64)> = each.collect();
     let line = line(&points)?;
     let ends = points.iter().fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), p| (a.min(p.0), b.max(p.0)));

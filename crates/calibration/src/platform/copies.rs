@@ -27,8 +27,7 @@ impl AnswerData<'_> {
     /// Measurements of run `r`, by channel, position and time.
     fn normalised(&self, r: usize) -> Vec<Normalised> {
         let run = &self.problem.runs[r];
-        let times: Vec<f64> =
-            run.bins.iter().flatten().map(|&(position, i)| run.reading.bins[position][i].t).collect();
+        let times: Vec<f64> = run.bins.iter().flatten().map(|place| run.reading.bin(place).t).collect();
         let own = self.found.all.iter().filter(|m| m.run == r);
         let of = |m: &MeasurementResidual| {
             ((m.key.channel, m.key.position), times[m.key.bin], m.residual / m.r.sqrt())

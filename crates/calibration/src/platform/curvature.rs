@@ -19,6 +19,7 @@ use obsdeg_ekf::Manifold;
 use obsdeg_evidence::simulation::{Noise, PlatformState};
 
 use super::CalibrationError;
+use super::estimate::LinearisedRun;
 use super::estimate::{PlatformEstimate, PlatformProblem};
 use super::posterior::{PosteriorSample, normal_pairs};
 use crate::least_squares::{Linearised, StartInformation};
@@ -46,6 +47,15 @@ const LEAST: f64 = 30.0;
 /// Largest product of bins, squared unknowns and samples.
 const WORK: f64 = 2e9;
 
+/// Mean and covariance of samples.
+#[derive(Debug, Clone)]
+pub(crate) struct SampleMoments {
+    /// Mean of the samples (shape n).
+    pub mean: DVector<f64>,
+    /// Root of their covariance (n x any).
+    pub root: DMatrix<f64>,
+}
+
 /// Curvature of an estimate, with mean and covariance of the posterior where it matters.
 #[derive(Debug, Clone)]
 pub(crate) struct CurvatureResult {
@@ -55,8 +65,8 @@ pub(crate) struct CurvatureResult {
     /// Number of samples; `failed` of them were not found.
     pub samples: usize,
     pub failed: usize,
-    /// Mean of the samples about the estimate, and a root (n x any) of their covariance.
-    pub found: Option<(DVector<f64>, DMatrix<f64>)>,
+    /// Moments of the samples about the estimate.
+    pub found: Option<SampleMoments>,
 }
 
 impl CurvatureResult {
@@ -118,7 +128,7 @@ impl PlatformProblem<'_> {
         }
         let mean = all.iter().zip(&weights).fold(DVector::zeros(n), |s, (x, w)| s + &x.x * *w);
         let root = DMatrix::from_fn(n, all.len(), |i, j| (all[j].x[i] - mean[i]) * weights[j].sqrt());
-        out.found = Some((mean, root));
+        out.found = Some(SampleMoments { mean, root });
         Ok(out)
     }
 
@@ -139,7 +149,7 @@ impl PlatformProblem<'_> {
         let eigen = (&scaled * scaled.transpose()).symmetric_eigen();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-        let outputs = estimate.at.runs.iter().flat_map(|(run, _)| &run.stages).flat_map(|s| &s.outputs);
+        let outputs = estimate.at.runs.iter().flat_map(|r| &r.run.stages).flat_map(|s| &s.outputs);
         let least = SEEN / outputs.map(|o| 1.0 / o.r).sum::<f64>().sqrt();
         let axis = |&k: &usize| {
             let length = eigen.eigenvalues[k].max(0.0).sqrt();
@@ -164,7 +174,7 @@ impl PlatformProblem<'_> {
     fn bend(&self, estimate: &PlatformEstimate, a: &DVector<f64>) -> Result<f64, CalibrationError> {
         let x = self.moved(&estimate.at.x, a);
         let mut sum = 0.0;
-        for (r, (own, (run, _))) in self.runs.iter().zip(&estimate.at.runs).enumerate() {
+        for (r, (own, LinearisedRun { run, .. })) in self.runs.iter().zip(&estimate.at.runs).enumerate() {
             let Ok((there, _)) = own.along(self.conditions, &self.sigmas, &x[r]) else {
                 return Ok(f64::INFINITY);
             };

@@ -162,14 +162,14 @@ impl AnswerData<'_> {
         let problem = self.problem;
         let with_prior = self.with_prior()?;
         let values = match &self.bent.found {
-            Some((mean, _)) => problem.values(&problem.moved(&self.estimate.at.x, mean)),
+            Some(found) => problem.values(&problem.moved(&self.estimate.at.x, &found.mean)),
             None => problem.values(&self.estimate.at.x),
         };
         let tight = problem.step_constrained(&self.estimate.at, TIGHT)?;
         let planned: LinearisedRuns = problem.at(at_rest)?;
         let planned = problem.step(&planned, WEAK)?;
         let none = || DMatrix::zeros(0, problem.unknowns.n);
-        let known = problem.known.as_ref().map_or_else(none, |(rows, _)| rows.clone());
+        let known = problem.known.as_ref().map_or_else(none, |k| k.rows.clone());
         Ok(ReportedSolutions { values, with_prior, tight, planned, known, factor })
     }
 

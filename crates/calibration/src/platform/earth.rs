@@ -98,7 +98,7 @@ impl AnswerData<'_> {
             return Ok(None);
         }
         let interval = own.reading.interval;
-        let last = bounds(self.planned).last().map_or(0.0, |b| b.1);
+        let last = bounds(self.planned).last().map_or(0.0, |b| b.to);
         let step = MOVED_ROWS * interval;
         let left = |late: f64, stretched: f64| {
             let reading = own.reading.later(late * step).stretched(stretched * step / last);
@@ -152,9 +152,9 @@ impl AnswerData<'_> {
         }
         if matches!(reading.by, By::Timeline | By::Both) {
             // as with labels, so that turns may take less time
-            let ends = bounds(self.planned).into_iter().map(|(_, end)| end);
+            let ends = bounds(self.planned).into_iter().map(|b| b.to);
             reading.by = By::Label;
-            reading.stays.iter_mut().zip(ends).for_each(|(stay, end)| stay.1 = end);
+            reading.stays.iter_mut().zip(ends).for_each(|(stay, end)| stay.to = end);
         }
         let left = |by: f64| -> Result<f64, CalibrationError> {
             let (conditions, run) = self.at_rate(own, &reading, by)?;

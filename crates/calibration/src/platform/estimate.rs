@@ -16,6 +16,7 @@ use obsdeg_evidence::simulation::{Conditions, PlatformState};
 use super::CalibrationError;
 use super::run::{MeasurementKey, RecordedRun};
 use crate::CalibrationProgress;
+use crate::least_squares::PriorRows;
 use crate::least_squares::{LeastSquaresSolution, Linearised, StackedRows, StartInformation};
 
 /// Most linearisations.
@@ -205,7 +206,7 @@ pub(crate) struct PlatformProblem<'a> {
     /// Standard deviations of a sample, by channel.
     pub sigmas: Vec<f64>,
     /// Prior information on some combinations: rows and values in SI units, with unit errors.
-    pub known: Option<(DMatrix<f64>, DVector<f64>)>,
+    pub known: Option<PriorRows>,
     /// Progress callback, called for every linearisation; the iteration ends when it returns false.
     pub progress: &'a dyn Fn(CalibrationProgress<'_>) -> bool,
     /// Number of linearisations.
@@ -214,10 +215,19 @@ pub(crate) struct PlatformProblem<'a> {
     pub stopped: Cell<bool>,
 }
 
+/// Run, linearised at the estimate.
+#[derive(Debug, Clone)]
+pub(crate) struct LinearisedRun {
+    /// Stages and residuals.
+    pub run: Linearised,
+    /// Measurement of every residual.
+    pub keys: Vec<MeasurementKey>,
+}
+
 /// All runs, linearised at the estimate.
 pub(crate) struct LinearisedRuns {
     pub x: Vec<PlatformState>,
-    pub runs: Vec<(Linearised, Vec<MeasurementKey>)>,
+    pub runs: Vec<LinearisedRun>,
     pub information: Vec<StartInformation>,
     /// Sum of squares of all residuals, with those of constraining rows and prior information.
     pub cost: f64,
@@ -252,12 +262,13 @@ impl PlatformProblem<'_> {
         }
         let each = self.runs.iter().zip(&x).enumerate();
         let runs = each.map(|(r, (run, x))| run.along_parts(self.conditions, &self.sigmas, x, nodes(r)));
+        let runs = runs.map(|along| along.map(|(run, keys)| LinearisedRun { run, keys }));
         let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let information =
-            runs.iter().map(|(run, _)| StartInformation::of(run)).collect::<Result<Vec<_>, EkfError>>()?;
+            runs.iter().map(|r| StartInformation::of(&r.run)).collect::<Result<Vec<_>, EkfError>>()?;
         let mut cost: f64 = information.iter().map(StartInformation::at_zero).sum();
         cost += self.constraint_residuals(&self.unknowns.constraint_rows(BOX), &x).norm_squared();
-        if let Some((rows, _)) = &self.known {
+        if let Some(PriorRows { rows, .. }) = &self.known {
             cost += self.known_left(rows, &x).norm_squared();
         }
         Ok(LinearisedRuns { x, runs, information, cost })
@@ -287,7 +298,7 @@ impl PlatformProblem<'_> {
 
     /// Residuals at `x` of the rows of the prior information.
     pub(super) fn known_left(&self, rows: &DMatrix<f64>, x: &[PlatformState]) -> DVector<f64> {
-        self.known.as_ref().map_or_else(|| DVector::zeros(0), |(_, values)| values - rows * self.values(x))
+        self.known.as_ref().map_or_else(|| DVector::zeros(0), |k| &k.values - rows * self.values(x))
     }
 
     /// Next step from `at`, with a pull to it `weak` times as weak as the prior.
@@ -349,7 +360,7 @@ impl PlatformProblem<'_> {
         }
         let constraint_rows = self.unknowns.constraint_rows(width);
         rows.add(&constraint_rows, &self.constraint_residuals(&constraint_rows, &at.x));
-        if let Some((known, _)) = &self.known {
+        if let Some(PriorRows { rows: known, .. }) = &self.known {
             rows.add(known, &self.known_left(known, &at.x));
         }
         rows
@@ -357,7 +368,7 @@ impl PlatformProblem<'_> {
 
     /// Factor on standard deviations by the fit: root of chi-square per measurement, at least one.
     fn scale(&self, at: &LinearisedRuns) -> f64 {
-        let rows: usize = at.runs.iter().map(|(run, _)| run.residuals.len()).sum();
+        let rows: usize = at.runs.iter().map(|r| r.run.residuals.len()).sum();
         (at.cost / rows.max(1) as f64).max(1.0).sqrt()
     }
 
@@ -374,7 +385,7 @@ impl PlatformProblem<'_> {
     /// Largest angle (rad) by which a step turns a platform anywhere in its run.
     pub(super) fn turn(&self, at: &LinearisedRuns, step: &DVector<f64>) -> f64 {
         let mut largest: f64 = 0.0;
-        for (((run, _), index), x) in at.runs.iter().zip(&self.unknowns.index).zip(&at.x) {
+        for ((LinearisedRun { run, .. }, index), x) in at.runs.iter().zip(&self.unknowns.index).zip(&at.x) {
             let own: Vec<f64> = index.iter().map(|&i| step[i]).collect();
             largest = largest.max(largest_turn(&own, x.attitudes()));
             run.carried(&own, |_, d| largest = largest.max(largest_turn(d, x.attitudes())));
@@ -417,6 +428,6 @@ impl PlatformProblem<'_> {
 
     /// Number of measurements.
     pub(crate) fn rows(&self, e: &PlatformEstimate) -> f64 {
-        e.at.runs.iter().map(|(run, _)| run.residuals.len()).sum::<usize>() as f64
+        e.at.runs.iter().map(|r| r.run.residuals.len()).sum::<usize>() as f64
     }
 }

@@ -3,16 +3,19 @@
 //! Tests have shares of the probability of a false alarm (`levels`); a finding with a certain cause has none.
 //! Sentences and recommended actions are in the crate `report` (`calibration`, `review/actions`).
 
+use obsdeg_core::span::Span;
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
 
-use super::diagnose::data::{AnswerData, MapBoth};
+use super::diagnose::data::AnswerData;
 use super::gross::GrossReason;
+use super::gross::LeftOutCell;
 use super::length::wrong;
 use super::run::RecordedRun;
 use super::successions::LeftOutMeasurement;
 use crate::answer::{
     Calibration, CalibrationFinding, CellKind, ClockRate, ForceLength, PositionFit, RecordReport,
 };
+use crate::least_squares::PriorRows;
 use crate::levels;
 
 /// Largest difference of the two paths, in sigma, that counts as agreement.
@@ -53,7 +56,7 @@ impl AnswerData<'_> {
         out.extend(
             self.too_many.map(|count| CalibrationFinding::Outliers { count, of: self.found.all.len() }),
         );
-        if let Some(r) = c.repeatability.as_ref().filter(|r| r.chi_square > r.band.1) {
+        if let Some(r) = c.repeatability.as_ref().filter(|r| r.chi_square > r.band.to) {
             out.push(CalibrationFinding::Repeatability { chi_square: r.chi_square });
         }
         if let Some(chi_square) = self.known_misfit() {
@@ -149,7 +152,7 @@ impl AnswerData<'_> {
         let mut apart: Vec<&&PositionFit> = all
             .iter()
             .filter(|p| p.chi_square > most(p.degrees_of_freedom))
-            .filter(|p| p.chi_square > APART * usual.min(c.fit.band.1.max(1.0)))
+            .filter(|p| p.chi_square > APART * usual.min(c.fit.band.to.max(1.0)))
             .collect();
         apart.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
         let named = apart.iter().map(|p| CalibrationFinding::Position {
@@ -168,14 +171,14 @@ impl AnswerData<'_> {
             return out;
         }
         let total = c.fit.factor * c.fit.factor;
-        if !(c.fit.band.0..=c.fit.band.1).contains(&total) {
+        if !c.fit.band.contains(&total) {
             out.push(CalibrationFinding::Noise { chi_square: total, factor: c.fit.factor });
             return out;
         }
         for channel in &c.channels {
             let (dof, level) = (channel.degrees_of_freedom, levels::CHANNEL / c.channels.len() as f64);
-            let band = chi_square_band(dof.max(1e-3), 1.0, 1.0 - level).map_both(|x| x / dof.max(1e-3));
-            if !(band.0..=band.1).contains(&channel.chi_square) {
+            let band = Span::from(chi_square_band(dof.max(1e-3), 1.0, 1.0 - level)).over(dof.max(1e-3));
+            if !band.contains(&channel.chi_square) {
                 out.push(CalibrationFinding::Channel {
                     channel: channel.channel.clone(),
                     chi_square: channel.chi_square,
@@ -188,7 +191,7 @@ impl AnswerData<'_> {
 
     /// Chi-square of the prior information against the estimate; `None` within its band.
     fn known_misfit(&self) -> Option<f64> {
-        let (rows, values) = self.problem.known.as_ref()?;
+        let PriorRows { rows, values } = self.problem.known.as_ref()?;
         let dof = values.len() as f64;
         let left = values - rows * self.problem.values(&self.estimate.at.x);
         let chi = left.norm_squared() / dof;
@@ -199,7 +202,7 @@ impl AnswerData<'_> {
 /// Findings on repeated values of cells in a column.
 fn cells(run: &RecordedRun) -> Vec<CalibrationFinding> {
     let mut out: Vec<CalibrationFinding> = Vec::new();
-    for (cell, own) in &run.reading.cells {
+    for LeftOutCell { cell, column: own } in &run.reading.cells {
         let kind = match cell.why {
             GrossReason::Far => continue,
             GrossReason::Code => CellKind::Code,
@@ -216,7 +219,7 @@ fn cells(run: &RecordedRun) -> Vec<CalibrationFinding> {
         match same {
             Some((count, lines)) => {
                 *count += 1;
-                *lines = (lines.0.min(cell.lines.0), lines.1.max(cell.lines.1));
+                *lines = Span { from: lines.from.min(cell.lines.from), to: lines.to.max(cell.lines.to) };
             }
             None => out.push(CalibrationFinding::Cells {
                 record: run.reading.name.clone(),

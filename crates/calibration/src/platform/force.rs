@@ -3,6 +3,7 @@
 
 use obsdeg_core::model::Matrix3;
 use obsdeg_core::model::slew::apply;
+use obsdeg_core::span::Span;
 
 use super::CalibrationError;
 use super::clock;
@@ -54,7 +55,7 @@ const SIGMA_OF_MEDIAN: f64 = 1.2533;
 #[derive(Debug, Clone)]
 struct Piece {
     /// First and last line of the record.
-    lines: (u64, u64),
+    lines: Span<u64>,
     /// Time of its first sample, in s.
     t: f64,
     samples: usize,
@@ -154,7 +155,7 @@ impl Forces {
     fn piece(&mut self, of: &[(u64, f64, [f64; 3])]) {
         let (Some(first), Some(last)) = (of.first(), of.last()) else { return };
         self.pieces[self.position].push(Piece {
-            lines: (first.0, last.0),
+            lines: Span { from: first.0, to: last.0 },
             t: first.1,
             samples: of.len(),
             force: std::array::from_fn(|i| median(of.iter().map(|s| s.2[i]))),
@@ -163,8 +164,8 @@ impl Forces {
     }
 
     /// Removes the pieces of a position with any of these lines.
-    pub(crate) fn leave_out(&mut self, position: usize, lines: (u64, u64)) {
-        self.pieces[position].retain(|piece| piece.lines.1 < lines.0 || lines.1 < piece.lines.0);
+    pub(crate) fn leave_out(&mut self, position: usize, lines: Span<u64>) {
+        self.pieces[position].retain(|piece| piece.lines.to < lines.from || lines.to < piece.lines.from);
     }
 
     /// Robust lengths of the force, by position. Their standard deviation is that of a median, from the known
@@ -185,7 +186,7 @@ impl Forces {
     /// Index, first line and median force of every position with samples.
     fn usual(&self) -> impl Iterator<Item = (usize, u64, [f64; 3])> + '_ {
         let of = |(p, pieces): (usize, &Vec<Piece>)| {
-            let line = pieces.first()?.lines.0;
+            let line = pieces.first()?.lines.from;
             Some((p, line, std::array::from_fn(|i| median(pieces.iter().map(|x| x.force[i])))))
         };
         self.pieces.iter().enumerate().filter_map(of)
@@ -258,7 +259,7 @@ impl Forces {
         attitudes: &[Matrix3<f64>],
     ) -> bool {
         let right = self.pieces[p].iter().filter(|x| (x.length - 1.0).abs() <= CLOSE);
-        let nearest = right.min_by_key(|x| x.lines.0.abs_diff(line).min(x.lines.1.abs_diff(line)));
+        let nearest = right.min_by_key(|x| x.lines.from.abs_diff(line).min(x.lines.to.abs_diff(line)));
         let (beside, within) = nearest.map_or_else(
             // specific force of a platform at the attitude of the scheme
             || (attitudes[p][1], ALONG),
@@ -358,7 +359,7 @@ impl Forces {
         record: &str,
         names: &[&str],
         attitudes: &[Matrix3<f64>],
-        timeline: Option<&[(f64, f64)]>,
+        timeline: Option<&[Span<f64>]>,
     ) -> Result<(), Box<Mistaken>> {
         let all: Vec<(usize, [f64; 3], [usize; 2])> =
             self.usual().map(|(p, _, force)| (p, force, away(&self.pieces[p], &force))).collect();
@@ -382,8 +383,8 @@ impl Forces {
             let (pieces, count) = (&self.pieces[p], away[side]);
             let first = pieces.len() - count;
             let (outer, from, to) = match begins {
-                true => (&pieces[0], pieces[count - 1].lines.0, pieces[count].lines.1),
-                false => (&pieces[pieces.len() - 1], pieces[first - 1].lines.0, pieces[first].lines.1),
+                true => (&pieces[0], pieces[count - 1].lines.from, pieces[count].lines.to),
+                false => (&pieces[pieces.len() - 1], pieces[first - 1].lines.from, pieces[first].lines.to),
             };
             let tilts = attitudes.iter().map(|c| tilt(c, &outer.force)).enumerate();
             let own = angle(&outer.force, &force);
@@ -410,7 +411,7 @@ impl Forces {
 impl Forces {
     /// Offset of the record's turns from those of the timeline, in words: a fast or slow clock, or a common
     /// delay; `None` if neither explains it.
-    fn clock(&self, all: &[(usize, [f64; 3], [usize; 2])], bounds: &[(f64, f64)]) -> Option<String> {
+    fn clock(&self, all: &[(usize, [f64; 3], [usize; 2])], bounds: &[Span<f64>]) -> Option<String> {
         let mut between: f64 = 0.0;
         let mut middle = |a: &Piece, b: &Piece| {
             between = between.max(b.t - a.t);
@@ -420,11 +421,11 @@ impl Forces {
             let [(p, _, before), (q, _, after)] = pair else { return (0.0, 0.0) };
             let (left, come) = (&self.pieces[*p], &self.pieces[*q]);
             match (before[1], after[0]) {
-                (0, 0) => (bounds[*p].1, bounds[*p].1),
-                (0, late) => (bounds[*q].0, middle(&come[late - 1], &come[late])),
+                (0, 0) => (bounds[*p].to, bounds[*p].to),
+                (0, late) => (bounds[*q].from, middle(&come[late - 1], &come[late])),
                 (early, _) => {
                     let first = left.len() - early;
-                    (bounds[*p].1, middle(&left[first - 1], &left[first]))
+                    (bounds[*p].to, middle(&left[first - 1], &left[first]))
                 }
             }
         };

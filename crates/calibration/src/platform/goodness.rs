@@ -1,8 +1,9 @@
 //! Chi-square of a fit against its degrees of freedom: of everything, and of what joining records adds.
 
+use obsdeg_core::span::Span;
 use obsdeg_ekf::consistency::chi_square_band;
 
-use super::diagnose::data::{AnswerData, MapBoth, ReportedFunctional};
+use super::diagnose::data::{AnswerData, ReportedFunctional};
 use crate::answer::{Fit, Repeatability};
 use crate::levels;
 
@@ -10,7 +11,7 @@ impl AnswerData<'_> {
     /// Degrees of freedom of what is known beside the records: rows of stated priors and of a calibration
     /// before, without those directions that they alone determine.
     fn free_of_priors(&self) -> f64 {
-        let known = self.problem.known.as_ref().map_or(0, |(_, values)| values.len());
+        let known = self.problem.known.as_ref().map_or(0, |k| k.values.len());
         (self.problem.unknowns.stated.len() + known).saturating_sub(self.problem.unknowns.given) as f64
     }
 
@@ -36,8 +37,8 @@ impl AnswerData<'_> {
         Fit {
             chi_square: left,
             degrees_of_freedom,
-            band: chi_square_band(degrees_of_freedom.max(1.0), 1.0, 1.0 - levels::NOISE)
-                .map_both(|x| x / degrees_of_freedom.max(1.0)),
+            band: Span::from(chi_square_band(degrees_of_freedom.max(1.0), 1.0, 1.0 - levels::NOISE))
+                .over(degrees_of_freedom.max(1.0)),
             factor: mean.sqrt(),
             passes: self.estimate.passes,
         }
@@ -58,8 +59,8 @@ impl AnswerData<'_> {
             Repeatability {
                 chi_square: joined / degrees_of_freedom,
                 degrees_of_freedom,
-                band: chi_square_band(degrees_of_freedom, 1.0, 1.0 - 2.0 * levels::REPEATABILITY)
-                    .map_both(|x| x / degrees_of_freedom),
+                band: Span::from(chi_square_band(degrees_of_freedom, 1.0, 1.0 - 2.0 * levels::REPEATABILITY))
+                    .over(degrees_of_freedom),
             }
         })
     }

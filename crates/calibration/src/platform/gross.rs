@@ -9,6 +9,7 @@
 //! codes of missing values.
 
 use nalgebra::{DMatrix, DVector};
+use obsdeg_core::span::Span;
 
 /// Length of a window that is fitted by one cubic, in s; the fewest rows of a window follow.
 const WINDOW_S: f64 = 1000.0;
@@ -37,7 +38,7 @@ const STUCK: usize = 4;
 #[derive(Debug, Clone)]
 pub(crate) struct MedianRow {
     /// First and last line.
-    pub lines: (u64, u64),
+    pub lines: Span<u64>,
     /// Time of the row, for a median the median of its times, in s of the record's clock.
     pub t: f64,
     /// Number of samples.
@@ -59,11 +60,20 @@ pub(crate) enum GrossReason {
     Stuck,
 }
 
+/// Cell that is left out, with its column.
+#[derive(Debug, Clone)]
+pub(crate) struct LeftOutCell {
+    /// Cell, with its value as written in the record.
+    pub cell: GrossCell,
+    /// Text of its column.
+    pub column: String,
+}
+
 /// Cell that is left out.
 #[derive(Debug, Clone)]
 pub(crate) struct GrossCell {
     /// First and last line.
-    pub lines: (u64, u64),
+    pub lines: Span<u64>,
     /// Index of its row within its position; `None` for a sample of a dense bin.
     pub row: Option<usize>,
     pub t: f64,
@@ -346,7 +356,7 @@ pub(crate) fn keep_turns(rows: &[MedianRow], found: &mut Vec<GrossCell>) {
     };
     let begin = rows.iter().take_while(|r| turns(r, first)).map(|r| r.lines);
     let end = rows.iter().rev().take_while(|r| turns(r, last)).map(|r| r.lines);
-    let kept: Vec<(u64, u64)> = begin.chain(end).collect();
+    let kept: Vec<Span<u64>> = begin.chain(end).collect();
     found.retain(|c| !kept.contains(&c.lines));
 }
 
@@ -363,7 +373,7 @@ mod tests {
             let t = 10.0 * i as f64;
             let angle = 0.3 + 6.3e-5 * t;
             let values = [angle.cos(), 0.2, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
-            MedianRow { lines: (i as u64 + 2, i as u64 + 2), t, samples: 1, values, bin: i }
+            MedianRow { lines: (i as u64 + 2, i as u64 + 2).into(), t, samples: 1, values, bin: i }
         };
         (0..250).map(of).collect()
     }
@@ -385,7 +395,7 @@ mod tests {
                 vec![(2, 0, GrossReason::Far), (62, 2, GrossReason::Far), (132, 1, GrossReason::Far)];
             expected.extend((162..174).map(|line| (line, 0, GrossReason::Code)));
             expected.extend((203..208).map(|line| (line, 2, GrossReason::Stuck)));
-            let found: Vec<_> = found.iter().map(|c| (c.lines.0, c.axis, c.why)).collect();
+            let found: Vec<_> = found.iter().map(|c| (c.lines.from, c.axis, c.why)).collect();
             assert_eq!(found, expected, "{seed}");
         }
     }
@@ -400,12 +410,18 @@ mod tests {
             let of = |i: usize| {
                 let angle = 0.1 * seed as f64 + 130f64.to_radians() / 3600.0 * 10.0 * i as f64;
                 let values = [angle.cos(), 0.0, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
-                MedianRow { lines: (i as u64, i as u64), t: 10.0 * i as f64, samples: 1, values, bin: i }
+                MedianRow {
+                    lines: (i as u64, i as u64).into(),
+                    t: 10.0 * i as f64,
+                    samples: 1,
+                    values,
+                    bin: i,
+                }
             };
             let mut rows: Vec<MedianRow> = (0..101).map(of).collect();
             assert!(cells(&rows, 1e-5, 5e-4).is_empty(), "{seed}: {:?}", cells(&rows, 1e-5, 5e-4));
             rows[100].values[0] += 3e-4;
-            found += usize::from(cells(&rows, 1e-5, 5e-4).iter().any(|c| c.lines.0 == 100));
+            found += usize::from(cells(&rows, 1e-5, 5e-4).iter().any(|c| c.lines.from == 100));
         }
         assert_eq!(found, 20);
     }
@@ -420,7 +436,13 @@ mod tests {
         for _ in 0..10_000 {
             let of = |i: usize| {
                 let values = [0; 3].map(|_| (10.0 * noise.normal()).round() * 1e-6);
-                MedianRow { lines: (i as u64, i as u64), t: 10.0 * i as f64, samples: 1, values, bin: i }
+                MedianRow {
+                    lines: (i as u64, i as u64).into(),
+                    t: 10.0 * i as f64,
+                    samples: 1,
+                    values,
+                    bin: i,
+                }
             };
             let own: Vec<MedianRow> = (0..100).map(of).collect();
             let equal = |w: &&[MedianRow]| (0..3).any(|k| w.iter().all(|r| r.values[k] == w[0].values[k]));

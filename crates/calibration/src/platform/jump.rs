@@ -155,8 +155,8 @@ impl Reading {
         };
         out.bins.iter_mut().flatten().for_each(|bin| set(&mut bin.t));
         out.stays.iter_mut().for_each(|stay| {
-            set(&mut stay.0);
-            set(&mut stay.1);
+            set(&mut stay.from);
+            set(&mut stay.to);
         });
         out.after.iter_mut().for_each(set);
         out

@@ -32,19 +32,22 @@ mod timeline;
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::{Scheme, SchemeError};
+use obsdeg_core::span::Span;
 use obsdeg_ekf::EkfError;
 use obsdeg_evidence::simulation::{Conditions, Plan, RunStart, SimulationError, predict, si_per_shown};
 
 use crate::CalibrationProgress;
 use crate::answer::{Before, Calibration, CovarianceTable};
+use crate::least_squares::PriorRows;
 pub use crate::record::STANDARD_GRAVITY;
 use crate::record::{Record, RecordError};
 use crate::setup::Setup;
 use estimate::RunUnknowns;
 use rounds::{CalibrationInputs, RoundEnd, Rounds};
 
+pub use crate::answer::ColumnRead;
 pub use mistaken::Mistaken;
-pub use reading::{CellRead, ColumnRead, PositionRead, RecordRead, RecordsRead, read_records};
+pub use reading::{CellRead, PositionRead, RecordRead, RecordsRead, read_records};
 pub(crate) use record_columns::TIMES;
 
 /// Reason why a scheme cannot be calibrated.
@@ -298,7 +301,8 @@ pub fn calibrate(
             RoundEnd::Open(found) => {
                 for (run, found) in runs.iter_mut().zip(found) {
                     let (at, interval) = (run.reading.origin, run.reading.interval);
-                    run.reading.open = found.then_some((at - interval, at + interval)).or(run.reading.open);
+                    let window = Span { from: at - interval, to: at + interval };
+                    run.reading.open = found.then_some(window).or(run.reading.open);
                 }
             }
             RoundEnd::LeftOut(off) => {
@@ -312,7 +316,7 @@ pub fn calibrate(
 }
 
 /// Prior information on the coefficients and their combinations: rows with unit errors, and names.
-type Known = ((DMatrix<f64>, DVector<f64>), Vec<String>);
+type Known = (PriorRows, Vec<String>);
 
 fn known(
     table: &CovarianceTable,
@@ -354,5 +358,6 @@ fn known(
     }
     let solve = |b: DMatrix<f64>| root.solve_lower_triangular(&b).ok_or_else(nothing);
     let values = solve(DMatrix::from_column_slice(m, 1, values.as_slice()))?.column(0).into_owned();
-    Ok(((solve(rows)?, values), found.iter().map(|(k, _)| table.names[*k].clone()).collect()))
+    let prior = PriorRows { rows: solve(rows)?, values };
+    Ok((prior, found.iter().map(|(k, _)| table.names[*k].clone()).collect()))
 }

@@ -162,8 +162,8 @@ impl Further<'_, '_> {
             wide.set_column(i, &information.root.column(s));
         }
         rows.add(&wide, &DVector::zeros(wide.nrows()));
-        let ((before, _), _) = known(&self.table, &plan, &prediction, &unknowns)?;
-        rows.add(&before, &DVector::zeros(before.nrows()));
+        let (before, _) = known(&self.table, &plan, &prediction, &unknowns)?;
+        rows.add(&before.rows, &DVector::zeros(before.rows.nrows()));
         // random biases have priors of their own
         let pull = unknowns.prior.iter().enumerate();
         let pull = pull.map(|(i, s)| 1.0 / if unknowns.biases.contains(&i) { *s } else { WEAK * s });

@@ -1,6 +1,7 @@
 //! Reading of a platform's record: its columns, the position of every sample, and bins of samples in n.
 
 use obsdeg_core::model::Carry;
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::Plan;
 
 use super::CalibrationError;
@@ -11,6 +12,7 @@ use super::placed::{By, Reading, TOLERANCE};
 use super::record_columns::{ObservedColumns, RecordColumns, TIMES, units_of_force};
 use super::timeline;
 use crate::CalibrationProgress;
+use crate::answer::ColumnRead;
 use crate::bins::Bin;
 use crate::record::Record;
 
@@ -21,10 +23,10 @@ const OFTEN: usize = 10_000;
 
 /// Checks for times in another unit than that of the header: all durations then have the same ratio to those
 /// of the scheme.
-fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) -> Result<(), Box<Mistaken>> {
-    let dwells: Vec<f64> = bounds(plan).iter().map(|(from, to)| to - from).collect();
-    let lasts: Vec<f64> = reading.stays.iter().map(|(from, to)| to - from).collect();
-    let ratio = |unit: f64| scale / unit;
+fn check_times(reading: &Reading, plan: &Plan, time: &ColumnRead) -> Result<(), Box<Mistaken>> {
+    let dwells: Vec<f64> = bounds(plan).iter().map(Span::length).collect();
+    let lasts: Vec<f64> = reading.stays.iter().map(Span::length).collect();
+    let ratio = |unit: f64| time.factor / unit;
     let like = |unit: f64| {
         let mut each = lasts.iter().enumerate().map(|(p, lasts)| lasts / dwells[p] / ratio(unit));
         (ratio(unit).ln().abs() > 1.0) && each.all(|x| (x - 1.0).abs() < 0.1)
@@ -32,7 +34,7 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
     match TIMES.iter().find(|(_, unit)| !lasts.is_empty() && like(*unit)) {
         Some((unit, _)) => Err(Box::new(Mistaken::TimeUnit {
             record: reading.name.clone(),
-            column: column.clone(),
+            column: time.column.clone(),
             found: format!("{:.6}", lasts[0]),
             expected: format!("{:.6}", dwells[0]),
             unit,
@@ -45,8 +47,7 @@ fn check_times(reading: &Reading, plan: &Plan, (column, scale): &(String, f64)) 
 /// between the rows. Positions that do not fit the timeline were held for other durations, and end with their
 /// last rows.
 fn lay(reading: &mut Reading, plan: &Plan, tolerance: f64) {
-    let by_clock: Vec<(f64, f64)> =
-        reading.stays.iter().map(|(from, to)| (from + reading.origin, to + reading.origin)).collect();
+    let by_clock: Vec<Span<f64>> = reading.stays.iter().map(|stay| stay.later(reading.origin)).collect();
     match timeline::begin(&by_clock, plan, tolerance) {
         Some(begin) => {
             *reading = reading.later(begin.at - reading.origin);
@@ -151,8 +152,8 @@ fn check_samples(out: &Reading, plan: &Plan) -> Result<(), CalibrationError> {
             By::Timeline => format!(
                 "the record is of {:.3} to {:.3} s, the scheme of 0 to {:.3} s (a column `position` says \
                  what is where)",
-                out.span.0,
-                out.span.1,
+                out.span.from,
+                out.span.to,
                 plan.duration_s()
             ),
         },

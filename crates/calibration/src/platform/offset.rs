@@ -5,6 +5,7 @@
 //! uniform between these bounds, represented by a normal distribution of the same variance.
 
 use nalgebra::DVector;
+use obsdeg_core::span::Span;
 use obsdeg_ekf::consistency::chi_square_band;
 
 use super::estimate::{PlatformEstimate, PlatformProblem, WEAK};
@@ -57,12 +58,12 @@ impl PlatformProblem<'_> {
         &self,
         estimate: &PlatformEstimate,
         r: usize,
-        (from, to): (f64, f64),
+        window: Span<f64>,
         lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Result<Offset, CalibrationError> {
         let (own, at) = (&self.runs[r], &estimate.at);
-        let (middle, width) = ((from + to) / 2.0, (to - from) / 12f64.sqrt());
-        let step = MOVED * (to - from);
+        let (middle, width) = (window.middle(), window.length() / 12f64.sqrt());
+        let step = MOVED * window.length();
         let left = |by: f64| -> Result<(f64, DVector<f64>), CalibrationError> {
             let mut run = lay(own.reading.later(by))?;
             run.counts.clone_from(&own.counts);
@@ -77,7 +78,7 @@ impl PlatformProblem<'_> {
         let curvature = ((low - 2.0 * same + high) / (step * step)).max(2.0 / (width * width));
         let slope = (high - low) / (2.0 * step);
         let best = -slope / curvature;
-        let by = best.clamp(from - own.reading.origin, to - own.reading.origin);
+        let by = best.clamp(window.from - own.reading.origin, window.to - own.reading.origin);
         Ok(Offset {
             by,
             sigma: (2.0 / curvature).sqrt(),
@@ -112,8 +113,8 @@ impl PlatformProblem<'_> {
         lay: &dyn Fn(Reading) -> Result<RecordedRun, CalibrationError>,
     ) -> Result<Vec<Option<Later>>, CalibrationError> {
         let of = |(r, own): (usize, &RecordedRun)| -> Result<Option<Later>, CalibrationError> {
-            let Some((from, to)) = own.reading.open else { return Ok(None) };
-            let step = MOVED * (to - from);
+            let Some(window) = own.reading.open else { return Ok(None) };
+            let step = MOVED * window.length();
             let residuals = |by: f64| {
                 let mut run = lay(own.reading.later(by))?;
                 run.counts.clone_from(&own.counts);
@@ -122,8 +123,8 @@ impl PlatformProblem<'_> {
             };
             let [(low, keys), (high, others)] = [residuals(-step)?, residuals(step)?];
             let column = low.iter().zip(&high).map(|(low, high)| (high - low) / (2.0 * step)).collect();
-            let same = keys == others && keys == estimate.at.runs[r].1;
-            Ok(same.then(|| Later { column, weight: 12.0 / (to - from).powi(2) }))
+            let same = keys == others && keys == estimate.at.runs[r].keys;
+            Ok(same.then(|| Later { column, weight: 12.0 / window.length().powi(2) }))
         };
         self.runs.iter().enumerate().map(of).collect()
     }
@@ -151,7 +152,7 @@ impl PlatformProblem<'_> {
         let found = self.offset(
             estimate,
             r,
-            (reading.origin - reading.interval, reading.origin + reading.interval),
+            Span { from: reading.origin - reading.interval, to: reading.origin + reading.interval },
             lay,
         )?;
         let explains = found.left <= most.max(EXPLAINED * estimate.at.cost);

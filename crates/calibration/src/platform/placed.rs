@@ -1,14 +1,15 @@
 //! Record of a platform with its samples at the positions of the scheme, in bins.
 
 use obsdeg_core::model::{AZIMUTH, Scheme};
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::Plan;
 
 use super::clock::{by_durations, of_turns};
-use super::gross;
+use super::gross::LeftOutCell;
 use super::length::Length;
 use super::record_columns::RecordColumns;
 use super::timeline::{self, RowGap, by_rows};
-use crate::answer::{self, EmptyCells, PositionsBy};
+use crate::answer::{self, ColumnRead, EmptyCells, PositionsBy};
 use crate::bins::{Bin, Spike};
 use crate::record::Record;
 
@@ -29,6 +30,15 @@ pub(crate) enum By {
     Static,
 }
 
+/// Place of a bin among those of a reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct BinPlace {
+    /// Index of the position.
+    pub position: usize,
+    /// Index of the bin within the position.
+    pub index: usize,
+}
+
 /// Record with its samples at the positions of its scheme.
 #[derive(Debug, Clone)]
 pub(crate) struct Reading {
@@ -43,7 +53,7 @@ pub(crate) struct Reading {
     pub origin: f64,
     /// Earliest and latest origin, in s; `None` unless labels leave it open and it differs from the scheme's
     /// clock.
-    pub open: Option<(f64, f64)>,
+    pub open: Option<Span<f64>>,
     /// True if rows alone say when positions begin and end.
     pub ends_open: bool,
     /// Usual interval between rows, in s.
@@ -51,21 +61,21 @@ pub(crate) struct Reading {
     /// Intervals with missing rows.
     pub gaps: Vec<RowGap>,
     /// Times of the first and the last sample, by position, in s.
-    pub stays: Vec<(f64, f64)>,
+    pub stays: Vec<Span<f64>>,
     /// Times of the first row behind each position, in s; infinite at the end of the record.
     pub after: Vec<f64>,
     pub spikes: Vec<Spike>,
-    /// Cells that are left out, with the text of their column.
-    pub cells: Vec<(gross::GrossCell, String)>,
-    /// Columns that were read: text, and number of empty cells at positions.
-    pub missing: Vec<(String, usize)>,
+    /// Cells that are left out.
+    pub cells: Vec<LeftOutCell>,
+    /// Columns that were read, with their empty cells at positions.
+    pub missing: Vec<EmptyCells>,
     pub samples: usize,
     /// Number of samples at no position.
     pub unused: usize,
     /// Number of samples at positions during a wait that the file states.
     pub waiting: usize,
     /// First and last time by the clock of the record, in s.
-    pub span: (f64, f64),
+    pub span: Span<f64>,
     /// Columns that are not used.
     pub ignored: Vec<String>,
     /// Mean length of the specific force, in g; `None` if the record has no forces.
@@ -77,7 +87,7 @@ pub(crate) struct Reading {
     /// Digest of the numbers.
     pub digest: String,
     /// Columns that are used, with the value of one of their numbers in s, g, g s, rad or degC.
-    pub columns: Vec<(String, f64)>,
+    pub columns: Vec<ColumnRead>,
     /// Separator and decimal mark in words; `None` for commas and points.
     pub written: Option<String>,
 }
@@ -120,7 +130,7 @@ impl Reading {
             samples: 0,
             unused: 0,
             waiting: 0,
-            span: (0.0, 0.0),
+            span: Span::default(),
             ignored: columns.ignored.clone(),
             force: None,
             lengths: vec![None; positions],
@@ -132,14 +142,19 @@ impl Reading {
         }
     }
 
+    /// Bin at a place.
+    pub(crate) fn bin(&self, place: &BinPlace) -> &Bin {
+        &self.bins[place.position][place.index]
+    }
+
     /// Reading with the scheme beginning `by` s later by the clock of the record.
     pub(crate) fn later(&self, by: f64) -> Self {
         let mut out = self.clone();
         out.origin += by;
         out.bins.iter_mut().flatten().for_each(|b| b.t -= by);
         out.spikes.iter_mut().for_each(|s| s.t -= by);
-        out.cells.iter_mut().for_each(|(c, _)| c.t -= by);
-        out.stays.iter_mut().for_each(|s| *s = (s.0 - by, s.1 - by));
+        out.cells.iter_mut().for_each(|c| c.cell.t -= by);
+        out.stays.iter_mut().for_each(|stay| *stay = stay.later(-by));
         out.after.iter_mut().for_each(|t| *t -= by);
         out
     }
@@ -147,7 +162,7 @@ impl Reading {
     /// Reading by a clock that is fast by the fraction `by`, corrected: all times are divided by `1 + by`.
     pub(super) fn stretched(mut self, by: f64) -> Self {
         self.bins.iter_mut().flatten().for_each(|b| b.t /= 1.0 + by);
-        self.stays.iter_mut().for_each(|s| *s = (s.0 / (1.0 + by), s.1 / (1.0 + by)));
+        self.stays.iter_mut().for_each(|s| *s = Span { from: s.from / (1.0 + by), to: s.to / (1.0 + by) });
         self
     }
 
@@ -166,12 +181,6 @@ impl Reading {
         self.gaps.iter().map(of).collect()
     }
 
-    /// Number of empty cells at positions, by column.
-    pub(crate) fn empty_cells(&self) -> Vec<EmptyCells> {
-        let of = |(column, count): &(String, usize)| EmptyCells { column: column.clone(), count: *count };
-        self.missing.iter().map(of).collect()
-    }
-
     /// Factor by which turns last longer than in the scheme; `None` if the record does not show it.
     pub(crate) fn of_turns(&self, plan: &Plan) -> Option<f64> {
         if self.by.own_time() { of_turns(&self.stays, self.interval, &timeline::slews(plan)) } else { None }
@@ -181,7 +190,7 @@ impl Reading {
     /// it.
     pub(crate) fn by_durations(&self, plan: &Plan) -> Option<answer::ClockRate> {
         let used = self.samples.saturating_sub(self.unused).max(1) as f64;
-        let between = self.stays.iter().map(|(from, to)| to - from).sum::<f64>() / used;
+        let between = self.stays.iter().map(Span::length).sum::<f64>() / used;
         match self.by {
             // the timeline of the scheme does not hold, so the rate is not zero
             By::Label => by_durations(&self.stays, between, plan, by_rows(&self.stays, plan)),

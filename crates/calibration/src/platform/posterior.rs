@@ -12,6 +12,7 @@ use obsdeg_evidence::simulation::Noise;
 use super::CalibrationError;
 use super::estimate::{BOX, LinearisedRuns, PlatformEstimate, PlatformProblem, TURN};
 use crate::least_squares::{Linearised, RunState, StartInformation};
+use crate::platform::estimate::LinearisedRun;
 
 /// Most linearisations of a sample.
 const PASSES: usize = 25;
@@ -87,14 +88,14 @@ impl PlatformProblem<'_> {
     /// [`CalibrationError`] when a number is not finite.
     pub(super) fn equation(&self, estimate: &PlatformEstimate) -> Result<Option<Equation>, CalibrationError> {
         let mut all = Vec::with_capacity(self.runs.len());
-        for (run, _) in &estimate.at.runs {
+        for LinearisedRun { run, .. } in &estimate.at.runs {
             let own = derivative(run);
             let columns = own.column_iter().map(|c| weighted(run, c.into_owned().as_slice()));
             let columns = columns.collect::<Result<Vec<_>, _>>()?;
             all.push(DMatrix::from_columns(&columns));
         }
         let none = DMatrix::zeros(0, self.unknowns.n);
-        let known = self.known.as_ref().map_or(none, |(rows, _)| rows.clone());
+        let known = self.known.as_ref().map_or(none, |k| k.rows.clone());
         let beside = [self.unknowns.constraint_rows(BOX), known];
         let information = self.slope(&all, &beside, &estimate.at);
         let symmetric = (&information + information.transpose()) / 2.0;
@@ -109,7 +110,9 @@ impl PlatformProblem<'_> {
         at: &LinearisedRuns,
     ) -> DMatrix<f64> {
         let mut out: DMatrix<f64> = beside.iter().map(|rows| rows.transpose() * rows).sum();
-        for (((run, _), weighted), index) in at.runs.iter().zip(weighted).zip(&self.unknowns.index) {
+        for ((LinearisedRun { run, .. }, weighted), index) in
+            at.runs.iter().zip(weighted).zip(&self.unknowns.index)
+        {
             let own = weighted.transpose() * derivative(run);
             for (a, &i) in index.iter().enumerate() {
                 index.iter().enumerate().for_each(|(b, &j)| out[(i, j)] += own[(a, b)]);
@@ -123,7 +126,9 @@ impl PlatformProblem<'_> {
         let [constraining, known] = &of.beside;
         let mut out = constraining.transpose() * self.constraint_residuals(constraining, &at.x)
             + known.transpose() * self.known_left(known, &at.x);
-        for (((run, _), weighted), index) in at.runs.iter().zip(&of.weighted).zip(&self.unknowns.index) {
+        for ((LinearisedRun { run, .. }, weighted), index) in
+            at.runs.iter().zip(&of.weighted).zip(&self.unknowns.index)
+        {
             let own = weighted.transpose() * DVector::from_column_slice(&run.residuals);
             index.iter().enumerate().for_each(|(a, &i)| out[i] += own[a]);
         }

@@ -1,16 +1,18 @@
 //! Report on how records are read, before anything is estimated.
 
 use obsdeg_core::model::Scheme;
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::{Conditions, Plan};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::gross::GrossReason;
+use super::gross::LeftOutCell;
 use super::observe::observe;
 use super::placed::Reading;
 use super::{CalibrationError, Options, run};
 use crate::CalibrationProgress;
-use crate::answer::{EmptyCells, Gap, PositionsBy};
+use crate::answer::{ColumnRead, EmptyCells, Gap, PositionsBy};
 use crate::record::Record;
 
 /// Reading of records, as `calibrate --dry-run` shows it.
@@ -42,7 +44,7 @@ pub struct RecordRead {
     /// Usual interval between rows, in s.
     pub interval_s: f64,
     /// First and last time, in s as they are in the record.
-    pub span_s: (f64, f64),
+    pub span_s: Span<f64>,
     /// Source of the position of each sample: labels, timeline, both, or intervals at rest.
     pub positions_by: PositionsBy,
     /// Time of the record, in s, at time 0 of the timeline: the start of the scheme, or the first row at a
@@ -50,7 +52,7 @@ pub struct RecordRead {
     pub origin_s: f64,
     /// Earliest and latest time 0 of the timeline, in s, if the labels leave it open; `calibrate` estimates
     /// it. Null if they do not.
-    pub origin_open_s: Option<(f64, f64)>,
+    pub origin_open_s: Option<Span<f64>>,
     /// Positions of the scheme.
     pub positions: Vec<PositionRead>,
     /// Intervals of more than three usual ones without rows, beyond the time of the slew where one lies
@@ -65,15 +67,6 @@ pub struct RecordRead {
     /// Largest angle between the gimbals and the attitudes of the scheme, in deg; null where the record has
     /// no gimbal angles.
     pub gimbals_deg: Option<f64>,
-}
-
-/// A column that is used.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct ColumnRead {
-    /// The header, as it is written.
-    pub column: String,
-    /// Factor from the unit of the column to s, g, g s (increments of velocity), rad or degC.
-    pub factor: f64,
 }
 
 /// A position of a record.
@@ -95,7 +88,7 @@ pub struct PositionRead {
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CellRead {
     /// First and last line; more than one where a dense bin is left out as a whole.
-    pub lines: (u64, u64),
+    pub lines: Span<u64>,
     /// The header of its column.
     pub column: String,
     /// Its value, as it is written.
@@ -129,14 +122,14 @@ pub fn read_records(
 }
 
 fn of(r: &Reading, scheme: &Scheme) -> RecordRead {
-    let position = |(p, stay): (usize, &(f64, f64))| PositionRead {
+    let position = |(p, stay): (usize, &Span<f64>)| PositionRead {
         position: scheme.positions[p].name.clone(),
-        from_s: r.origin + stay.0,
-        to_s: r.origin + stay.1,
+        from_s: r.origin + stay.from,
+        to_s: r.origin + stay.to,
         bins: r.bins[p].len(),
         force_g: r.lengths[p].map(|l| l.length),
     };
-    let cell = |(cell, column): &(super::gross::GrossCell, String)| CellRead {
+    let cell = |LeftOutCell { cell, column }: &LeftOutCell| CellRead {
         lines: cell.lines,
         column: column.clone(),
         value: cell.value,
@@ -146,11 +139,10 @@ fn of(r: &Reading, scheme: &Scheme) -> RecordRead {
             GrossReason::Stuck => "stuck",
         },
     };
-    let column = |(column, factor): &(String, f64)| ColumnRead { column: column.clone(), factor: *factor };
     RecordRead {
         record: r.name.clone(),
         written: r.written.clone(),
-        columns: r.columns.iter().map(column).collect(),
+        columns: r.columns.clone(),
         ignored: r.ignored.clone(),
         samples: r.samples,
         unused: r.unused,
@@ -161,7 +153,7 @@ fn of(r: &Reading, scheme: &Scheme) -> RecordRead {
         origin_open_s: r.open,
         positions: r.stays.iter().enumerate().map(position).collect(),
         gaps: r.gaps(scheme),
-        empty_cells: r.empty_cells(),
+        empty_cells: r.missing.clone(),
         left_out: r.cells.iter().map(cell).collect(),
         force_g: r.force,
         gimbals_deg: r.gimbals,

@@ -1,12 +1,15 @@
 //! Columns of a platform's record: those that are requested, with their units, and their numbers in n.
 
+use std::ops::Range;
+
 use obsdeg_core::model::slew::apply;
 use obsdeg_core::model::{AZIMUTH, Float, Matrix3, elementary, product};
 use obsdeg_evidence::simulation::Plan;
 
 use super::CalibrationError;
 use super::force::ForceColumn;
-use crate::record::{Record, RecordColumn, RecordError, Wanted};
+use crate::answer::{ColumnRead, EmptyCells};
+use crate::record::{Record, RecordColumn, RecordError, TIME_INDEX, Wanted};
 
 /// Units of forces, with their values in g (`None`: a metre per second squared, which depends on gravity).
 const FORCES: [(&str, Option<f64>); 4] =
@@ -25,6 +28,11 @@ const TEMPERATURES: [(&str, f64); 3] = [("degC", 1.0), ("C", 1.0), ("K", 1.0)];
 /// Units of time.
 pub(crate) const TIMES: [(&str, f64); 6] =
     [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
+/// Indices of the three observed columns among the requested numbers, which follow the time.
+pub(super) const OBSERVED: Range<usize> = TIME_INDEX + 1..TIME_INDEX + 4;
+/// Index of the azimuth among the requested numbers, where it is one.
+const AZIMUTH_INDEX: usize = OBSERVED.end;
+
 /// Meaning of the three observed columns of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ObservedColumns {
@@ -43,7 +51,7 @@ pub(super) struct RecordColumns {
     /// Columns of the force; `None` if Z is observed.
     pub forces: Option<[ForceColumn; 3]>,
     /// Column of the time: its text, and the value of one of its numbers in s.
-    pub time: (String, f64),
+    pub time: ColumnRead,
     pub wanted: Vec<Wanted>,
     pub azimuth: bool,
     pub sigmas: bool,
@@ -169,7 +177,7 @@ impl RecordColumns {
         Ok(Self {
             observed,
             forces,
-            time: (text(&of_time), of_time.scale),
+            time: ColumnRead { column: text(&of_time), factor: of_time.scale },
             wanted,
             azimuth,
             sigmas,
@@ -184,45 +192,53 @@ impl RecordColumns {
 
     /// True if the record has the observed column `i` of three; otherwise its number is that of the time.
     pub(super) fn own(&self, i: usize) -> bool {
-        self.wanted[i + 1].column != self.wanted[0].column
+        self.wanted[OBSERVED][i].column != self.wanted[TIME_INDEX].column
     }
 
     /// Columns that are used, in their order, with the value of one of their numbers.
-    pub(super) fn used(&self, record: &Record) -> Vec<(String, f64)> {
+    pub(super) fn used(&self, record: &Record) -> Vec<ColumnRead> {
+        let text = |w: &Wanted| record.columns()[w.column].text.clone();
         let mut all: Vec<&Wanted> = self.wanted.iter().collect();
         all.sort_by_key(|w| w.column);
         all.dedup_by_key(|w| w.column);
-        all.into_iter().map(|w| (record.columns()[w.column].text.clone(), w.scale)).collect()
+        all.into_iter().map(|w| ColumnRead { column: text(w), factor: w.scale }).collect()
     }
 
     /// Columns with empty cells, and their number.
-    pub(super) fn missing(&self, columns: &[String], empty: &[usize]) -> Vec<(String, usize)> {
+    pub(super) fn missing(&self, columns: &[String], empty: &[usize]) -> Vec<EmptyCells> {
         let mut out: Vec<(usize, usize)> =
             self.wanted.iter().zip(empty).map(|(w, n)| (w.column, *n)).filter(|(_, n)| *n > 0).collect();
         out.sort_unstable();
         out.dedup();
-        out.into_iter().map(|(c, n)| (columns[c].clone(), n)).collect()
+        out.into_iter().map(|(c, count)| EmptyCells { column: columns[c].clone(), count }).collect()
+    }
+
+    /// Indices of the standard deviations among the requested numbers, if the record has some.
+    fn of_sigmas(&self) -> Option<Range<usize>> {
+        let first = if self.azimuth { AZIMUTH_INDEX + 1 } else { AZIMUTH_INDEX };
+        self.sigmas.then_some(first..first + 3)
     }
 
     /// Divides the increments of a row by the interval `dt` (s) into mean forces; an unknown interval leaves
     /// none.
     pub(super) fn divide(&self, numbers: &mut [Option<f64>], dt: Option<f64>) {
-        let first = if self.azimuth { 5 } else { 4 };
-        let sigmas = if self.sigmas { first..first + 3 } else { 0..0 };
-        for i in (1..4).chain(sigmas) {
+        for i in OBSERVED.chain(self.of_sigmas().unwrap_or(0..0)) {
             numbers[i] = numbers[i].and_then(|dv| Some(dv / dt?));
         }
     }
 
     /// Components 1, 2, 3 of Z in n, and the azimuth, of a row at the attitude `c`.
     pub(super) fn in_n(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> [Option<f64>; 4] {
-        let azimuth = if self.azimuth { n[4] } else { None };
-        let turned = match (n[1], n[2], n[3]) {
-            (Some(x), Some(y), Some(z)) => Some(apply(c, &[x, y, z])),
+        let azimuth = if self.azimuth { n[AZIMUTH_INDEX] } else { None };
+        let turned = match n[OBSERVED] {
+            [Some(x), Some(y), Some(z)] => Some(apply(c, &[x, y, z])),
             _ => None,
         };
         match self.observed {
-            ObservedColumns::Geographic => [n[1], n[2], n[3], azimuth],
+            ObservedColumns::Geographic => {
+                let own = &n[OBSERVED];
+                [own[0], own[1], own[2], azimuth]
+            }
             ObservedColumns::Platform => {
                 [turned.map(|z| z[0]), turned.map(|z| z[1]), turned.map(|z| z[2]), azimuth]
             }
@@ -246,8 +262,8 @@ impl RecordColumns {
     /// Standard deviations of the components in n; `None` if the record has none. Those of platform axes are
     /// turned without their correlation.
     pub(super) fn sigmas_in_n(&self, n: &[Option<f64>], c: &Matrix3<f64>) -> Option<[Option<f64>; 3]> {
-        let first = if self.azimuth { 5 } else { 4 };
-        let own = self.sigmas.then(|| [n[first], n[first + 1], n[first + 2]])?;
+        let of = self.of_sigmas()?;
+        let own: [Option<f64>; 3] = std::array::from_fn(|i| n[of.start + i]);
         if self.observed == ObservedColumns::Geographic {
             return Some(own);
         }

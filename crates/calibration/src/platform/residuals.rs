@@ -6,8 +6,10 @@ use obsdeg_ekf::consistency::{autocorrelation, chi_square_tail};
 
 use super::diagnose::data::AnswerData;
 use super::diagnose::filter_path::MeasurementResidual;
+use super::placed::BinPlace;
 use super::placed::channel_name;
 use crate::answer::{Residual, ResidualSeries, Warmth};
+use crate::answer::{ResidualDeviation, ResidualPoint};
 
 /// Fewest residuals of a position whose correlation with the temperature is reported.
 const FEWEST_WARM: usize = 10;
@@ -31,11 +33,11 @@ impl AnswerData<'_> {
     /// to the platform changes its sign in n.
     pub(super) fn warmth(&self, run: usize, channel: usize) -> Option<Warmth> {
         let reading = &self.problem.runs[run].reading;
-        let places: Vec<(usize, usize)> = self.problem.runs[run].bins.iter().flatten().copied().collect();
+        let places: Vec<&BinPlace> = self.problem.runs[run].bins.iter().flatten().collect();
         let mut pairs = vec![Vec::new(); reading.bins.len()];
         for l in self.found.all.iter().filter(|l| l.run == run && l.key.channel == channel) {
-            let (position, i) = places[l.key.bin];
-            pairs[position].extend(reading.bins[position][i].temperature.map(|t| (t, l.normalised)));
+            let place = places[l.key.bin];
+            pairs[place.position].extend(reading.bin(place).temperature.map(|t| (t, l.normalised)));
         }
         // for independent pairs artanh r is normal, with variance 1/(n - 3)
         let all = pairs.iter().filter(|p| p.len() >= FEWEST_WARM).filter_map(|p| {
@@ -53,7 +55,7 @@ impl AnswerData<'_> {
         let times: Vec<Vec<f64>> = runs
             .iter()
             .map(|run| {
-                let of = |&(p, i): &(usize, usize)| run.reading.origin + run.reading.bins[p][i].t;
+                let of = |place: &BinPlace| run.reading.origin + run.reading.bin(place).t;
                 run.bins.iter().flatten().map(of).collect()
             })
             .collect();
@@ -89,7 +91,8 @@ impl AnswerData<'_> {
                 let clusters = std::iter::successors(Some(1), |m| Some(2 * m)).take_while(|m| 3 * m <= n);
                 let allan = clusters.filter_map(|m| {
                     let found = overlapping_deviation(&values, m).ok()?;
-                    Some((m as f64 * step, found, sigma / (m as f64).sqrt()))
+                    let (tau_s, white) = (m as f64 * step, sigma / (m as f64).sqrt());
+                    Some(ResidualDeviation { tau_s, deviation: found, white })
                 });
                 out.push(ResidualSeries {
                     record: run.reading.name.clone(),
@@ -99,7 +102,7 @@ impl AnswerData<'_> {
                     points: own
                         .iter()
                         .step_by(n.div_ceil(POINTS))
-                        .map(|l| (l.t_s, l.residual, l.sigma))
+                        .map(|l| ResidualPoint { t_s: l.t_s, residual: l.residual, sigma: l.sigma })
                         .collect(),
                     autocorrelation: autocorrelation(&normalised, LAGS.min(n / 4)),
                     count: n,

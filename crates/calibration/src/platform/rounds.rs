@@ -3,7 +3,6 @@
 
 use std::cell::Cell;
 
-use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::Scheme;
 use obsdeg_core::model::settings::concerns;
 use obsdeg_ekf::consistency::chi_square_quantile;
@@ -20,6 +19,7 @@ use super::run::{MeasurementKey, RecordedRun};
 use super::{CalibrationError, Options, known};
 use crate::CalibrationProgress;
 use crate::answer::Calibration;
+use crate::least_squares::PriorRows;
 use crate::record::Record;
 use crate::setup::SourceRecord;
 
@@ -46,7 +46,7 @@ pub(super) struct CalibrationInputs<'a> {
 pub(super) struct UnknownsWithPrior {
     pub unknowns: RunUnknowns,
     /// Rows and values of a prior calibration, with unit errors.
-    pub known: Option<(DMatrix<f64>, DVector<f64>)>,
+    pub known: Option<PriorRows>,
     /// Names in the prior calibration of what these rows determine.
     pub names: Vec<String>,
 }
@@ -124,7 +124,7 @@ impl CalibrationInputs<'_> {
         let known = before.map(|b| known(&b.estimates, planned, prediction, &unknowns)).transpose()?;
         let (known, names) = known.map_or((None, Vec::new()), |(k, names)| (Some(k), names));
         let mut prior = unknowns.stated_rows();
-        if let Some((rows, _)) = &known {
+        if let Some(PriorRows { rows, .. }) = &known {
             let above = prior.nrows();
             prior = prior.resize_vertically(above + rows.nrows(), 0.0);
             prior.rows_mut(above, rows.nrows()).copy_from(rows);
@@ -315,8 +315,8 @@ impl<'a> Rounds<'a> {
         let lay = |reading: Reading| inputs.lay(reading);
         let linear = estimate.solution.clone();
         let bent = problem.bent(&estimate, inputs.options.seed)?;
-        if let Some((_, root)) = &bent.found {
-            estimate.solution.inverse_root.clone_from(root);
+        if let Some(found) = &bent.found {
+            estimate.solution.inverse_root.clone_from(&found.root);
         }
         for o in self.offsets.iter().flatten() {
             let root = &mut estimate.solution.inverse_root;

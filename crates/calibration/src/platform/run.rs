@@ -6,6 +6,7 @@ use std::iter::Peekable;
 use nalgebra::{DMatrix, DVector};
 use obsdeg_core::model::settings::DriftNoise;
 use obsdeg_core::model::{Dwell, Scheme};
+use obsdeg_core::span::Span;
 use obsdeg_ekf::{
     EkfError, Manifold, Measurement, Motion, ProcessNoise, ScalarOutput, Stage, Transition, Update,
 };
@@ -15,10 +16,12 @@ use obsdeg_evidence::simulation::{
 
 use super::CalibrationError;
 use super::clock::words;
+use super::placed::BinPlace;
 use super::placed::Reading;
 use super::timeline::slews;
 use crate::bins::{Bin, Mean};
 use crate::least_squares::Linearised;
+use crate::least_squares::TrajectoryGap;
 
 /// Smallest distance between two bins, in s.
 const CLOSEST: f64 = 1e-6;
@@ -28,8 +31,8 @@ const CLOSEST: f64 = 1e-6;
 pub(crate) struct RecordedRun {
     pub reading: Reading,
     pub plan: Plan,
-    /// Bin at the end of each segment of the plan, as (position, index).
-    pub bins: Vec<Option<(usize, usize)>>,
+    /// Bin at the end of each segment of the plan.
+    pub bins: Vec<Option<BinPlace>>,
     /// Flags by bin (in order) and channel: true if the measurement counts.
     pub counts: Vec<Vec<bool>>,
     /// Changes of position whose time the rows leave open, in order.
@@ -146,14 +149,14 @@ fn parts(bins: &[Bin], begin: f64, length: f64) -> Vec<(usize, f64)> {
 
 /// Lengths of the intervals in which the rows leave open when each position begins, in s. Ends of `stays`
 /// move to their middles.
-fn open_ends(reading: &Reading, stays: &mut [(f64, f64)], slews: &[f64]) -> Vec<f64> {
+fn open_ends(reading: &Reading, stays: &mut [Span<f64>], slews: &[f64]) -> Vec<f64> {
     let mut open = vec![0.0; reading.bins.len()];
     if reading.ends_open {
         // the platform leaves a position at any time between its last row and the latest time from which
         // the slew takes it to the next position before the first row there: on average in the middle
         for p in 1..stays.len() {
-            open[p] = (stays[p].0 - stays[p - 1].1 - slews[p]).max(0.0);
-            stays[p - 1].1 += open[p] / 2.0;
+            open[p] = (stays[p].from - stays[p - 1].to - slews[p]).max(0.0);
+            stays[p - 1].to += open[p] / 2.0;
         }
     }
     open
@@ -166,7 +169,7 @@ fn open_ends(reading: &Reading, stays: &mut [(f64, f64)], slews: &[f64]) -> Vec<
 /// [`CalibrationError::Slew`].
 fn dwell_as_recorded(
     reading: &Reading,
-    stays: &[(f64, f64)],
+    stays: &[Span<f64>],
     slews: &[f64],
     planned: &Plan,
     own: &mut Scheme,
@@ -175,7 +178,7 @@ fn dwell_as_recorded(
     let mut left = 0.0;
     for (p, position) in own.positions.iter_mut().enumerate() {
         let turned = slews[p];
-        let (first, last) = stays[p];
+        let Span { from: first, to: last } = stays[p];
         begins[p] = left + turned;
         if begins[p] > first {
             return Err(CalibrationError::Slew {
@@ -195,13 +198,13 @@ fn dwell_as_recorded(
     Ok(())
 }
 
-/// Bin at the end of each segment of a plan, as (position, index), and the changes of position, each of which
+/// Bin at the end of each segment of a plan, and the changes of position, each of which
 /// is `open` by some time (s).
 fn bins_of_segments(
     plan: &Plan,
     reading: &Reading,
     open: &[f64],
-) -> (Vec<Option<(usize, usize)>>, Vec<PositionChange>) {
+) -> (Vec<Option<BinPlace>>, Vec<PositionChange>) {
     let mut seen = vec![0; open.len()];
     let mut bins = Vec::with_capacity(plan.segments.len());
     let mut changes: Vec<PositionChange> = Vec::new();
@@ -216,7 +219,7 @@ fn bins_of_segments(
             let open = if carried { open[s.position] } else { 0.0 };
             changes.push(PositionChange { to: s.position, begin: k, open });
         }
-        bins.push(there.then_some((s.position, next)));
+        bins.push(there.then_some(BinPlace { position: s.position, index: next }));
         seen[s.position] += usize::from(there);
     }
     changes.retain(|c| c.open > CLOSEST);
@@ -266,8 +269,8 @@ impl RecordedRun {
     /// Measurements of the run in order, with their keys and bins.
     pub(crate) fn measured(&self) -> impl Iterator<Item = (MeasurementKey, Mean, &Bin)> + '_ {
         let of = self.bins.iter().flatten().enumerate();
-        of.flat_map(move |(bin, &(position, i))| {
-            let b = &self.reading.bins[position][i];
+        of.flat_map(move |(bin, place)| {
+            let (position, b) = (place.position, self.reading.bin(place));
             let means = b.channels.iter().enumerate();
             means.filter_map(move |(channel, m)| Some((MeasurementKey { position, bin, channel }, (*m)?, b)))
         })
@@ -322,7 +325,8 @@ impl RecordedRun {
             let motion = filter.motion(segment);
             if let Some((_, node)) = nodes.next_if(|(at, _)| *at == segment) {
                 let begins = along.x.clone().with_attitude_of(motion.block(), node);
-                out.gaps.push((segment.saturating_sub(1), DVector::from_vec(along.x.local(&begins))));
+                let end = DVector::from_vec(along.x.local(&begins));
+                out.gaps.push(TrajectoryGap { step: segment.saturating_sub(1), end });
                 along.x = begins;
             }
             let (transition, noise) = motion.advance(0.0, s.dt, &mut along.x)?;
@@ -394,8 +398,9 @@ impl<'a> RunLinearisation<'a> {
     ) -> Result<Vec<ScalarOutput>, EkfError> {
         let (run, sigmas, now, bin) = (self.run, self.sigmas, self.now, self.bin);
         let mut outputs = Vec::new();
-        let Some((position, i)) = run.bins[segment] else { return Ok(outputs) };
-        let channels = &run.reading.bins[position][i].channels;
+        let Some(place) = &run.bins[segment] else { return Ok(outputs) };
+        let position = place.position;
+        let channels = &run.reading.bin(place).channels;
         let bent = channels.iter().zip(sigmas).any(|(mean, sigma)| {
             let bends =
                 |m: &Mean| m.bend * BENDS > FLAT * m.variance.sqrt() * if m.given { 1.0 } else { *sigma };

@@ -15,6 +15,7 @@ use obsdeg_evidence::simulation::{Conditions, ExtendedFilter, PlatformState, Seg
 use super::CalibrationError;
 use super::estimate::{PlatformProblem, TURN, WEAK, largest_turn};
 use super::run::RecordedRun;
+use crate::platform::estimate::LinearisedRun;
 
 /// Most passes.
 const PASSES: usize = 40;
@@ -58,15 +59,15 @@ impl RecordedRun {
         let mut number = self.bins[..*segments.first()?].iter().flatten().count();
         for &segment in segments {
             t += self.plan.segments[segment].dt;
-            let Some((position, i)) = self.bins[segment] else { continue };
-            let bin = &self.reading.bins[position][i];
+            let Some(place) = &self.bins[segment] else { continue };
+            let bin = self.reading.bin(place);
             for (points, channel) in points.iter_mut().zip(channels) {
                 let mean = channel.filter(|&c| self.counts[number][c]).and_then(|c| bin.channels[c]);
                 points.extend(mean.map(|m| (t, m.value)));
             }
             number += 1;
             bins += 1;
-            over += usize::from(self.reading.over[position][i]);
+            over += usize::from(self.reading.over[place.position][place.index]);
         }
         let [z1, z2, z3] = points.map(|p| at_zero(&p));
         let (x, z) = (-z1?, -z3?);
@@ -130,7 +131,7 @@ impl PlatformProblem<'_> {
             let step = self.step(&at, WEAK)?.x;
             let mut largest: f64 = 0.0;
             let mut moves: Vec<(Vec<f64>, Vec<Vec<f64>>)> = Vec::with_capacity(parts.len());
-            for (r, (part, (run, _))) in parts.iter().zip(&at.runs).enumerate() {
+            for (r, (part, LinearisedRun { run, .. })) in parts.iter().zip(&at.runs).enumerate() {
                 let attitudes = part.start.attitudes();
                 let own: Vec<f64> = self.unknowns.index[r].iter().map(|&i| step[i]).collect();
                 largest = largest.max(largest_turn(&own, attitudes));

@@ -1,9 +1,12 @@
 //! Measurements that were left out one after the other, all off to the same side: a step of an output or a
 //! platform that moved, and no outliers, which are independent of each other.
 
+use obsdeg_core::span::Span;
+
 use super::CalibrationError;
 use super::diagnose::data::AnswerData;
 use super::gross::GrossReason;
+use super::gross::LeftOutCell;
 use super::placed::channel_name;
 use super::run::RecordedRun;
 use crate::answer::{CalibrationFinding, Outlier};
@@ -41,13 +44,15 @@ impl AnswerData<'_> {
                 channel,
                 sigmas,
             };
-            let at = |t: f64| reading.stays.iter().rposition(|stay| stay.0 <= t).unwrap_or(0);
-            for (cell, column) in reading.cells.iter().filter(|(c, _)| c.why == GrossReason::Far) {
+            let at = |t: f64| reading.stays.iter().rposition(|stay| stay.from <= t).unwrap_or(0);
+            for LeftOutCell { cell, column } in
+                reading.cells.iter().filter(|c| c.cell.why == GrossReason::Far)
+            {
                 let outlier = outlier(cell.lines, cell.t, column.clone(), cell.sigmas);
                 out.push(LeftOutMeasurement { position: at(cell.t), place: cell.row, outlier });
             }
             for s in &reading.spikes {
-                let outlier = outlier((s.line, s.line), s.t, channel(s.channel), s.sigmas);
+                let outlier = outlier(Span { from: s.line, to: s.line }, s.t, channel(s.channel), s.sigmas);
                 out.push(LeftOutMeasurement { position: at(s.t), place: None, outlier });
             }
             if run.counts.iter().flatten().all(|counts| *counts) {
@@ -90,12 +95,12 @@ impl AnswerData<'_> {
                     position: self.scheme.positions[run[0].position].name.clone(),
                     channel: run[0].outlier.channel.clone(),
                     count: run.len(),
-                    lines: (run[0].outlier.lines.0, run[run.len() - 1].outlier.lines.1),
-                    span_s: (end(run[0]), end(run[run.len() - 1])),
-                    sigmas: (
-                        sign * sigmas().fold(f64::INFINITY, f64::min),
-                        sign * sigmas().fold(0.0, f64::max),
-                    ),
+                    lines: Span { from: run[0].outlier.lines.from, to: run[run.len() - 1].outlier.lines.to },
+                    span_s: Span { from: end(run[0]), to: end(run[run.len() - 1]) },
+                    sigmas: Span {
+                        from: sign * sigmas().fold(f64::INFINITY, f64::min),
+                        to: sign * sigmas().fold(0.0, f64::max),
+                    },
                 }
             })
             .collect()

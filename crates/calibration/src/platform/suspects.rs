@@ -22,6 +22,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use super::CalibrationError;
+use super::estimate::LinearisedRun;
 use super::estimate::{PlatformEstimate, PlatformProblem};
 use super::offset::Later;
 use super::run::{MeasurementKey, RecordedRun};
@@ -213,7 +214,9 @@ fn tested(
         shown,
     };
     let mut changes = Vec::new();
-    for (r, (run, (linear, keys))) in problem.runs.iter().zip(&estimate.at.runs).enumerate() {
+    for (r, (run, LinearisedRun { run: linear, keys })) in
+        problem.runs.iter().zip(&estimate.at.runs).enumerate()
+    {
         let columns = columns(run, model, keys, run.tilts(problem.conditions, &estimate.at.x[r])?)?;
         let filter = DiffuseFilter::new(problem, r, linear)?;
         let (_, mut own) = filter.through(&linear.residuals)?;

@@ -4,6 +4,7 @@
 //! A row labelled with a position lies inside it, so the first and the last row of every position bound the
 //! beginning of the scheme. If these bounds contain zero, the clock of the record is that of the scheme.
 
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::{Plan, PlanSegment, SegmentKind};
 
 use super::clock::bounds;
@@ -25,22 +26,22 @@ pub(crate) struct Begin {
     /// Beginning that is used, in s.
     pub at: f64,
     /// Earliest and latest beginning, in s; `None` where the beginning is that of the scheme's own clock.
-    pub open: Option<(f64, f64)>,
+    pub open: Option<Span<f64>>,
 }
 
 /// Bounds of the beginning if positions last `1 + rate` times as long as in the scheme.
-fn window(stays: &[(f64, f64)], bounds: &[(f64, f64)], rate: f64) -> (f64, f64) {
+fn window(stays: &[Span<f64>], bounds: &[Span<f64>], rate: f64) -> Span<f64> {
     let each = || stays.iter().zip(bounds);
-    let from = each().map(|(stay, own)| stay.1 - (1.0 + rate) * own.1).fold(f64::NEG_INFINITY, f64::max);
-    let to = each().map(|(stay, own)| stay.0 - (1.0 + rate) * own.0).fold(f64::INFINITY, f64::min);
-    (from, to)
+    let from = each().map(|(stay, own)| stay.to - (1.0 + rate) * own.to).fold(f64::NEG_INFINITY, f64::max);
+    let to = each().map(|(stay, own)| stay.from - (1.0 + rate) * own.from).fold(f64::INFINITY, f64::min);
+    Span { from, to }
 }
 
 /// Beginning of the scheme by the clock of a record with the first and last rows of its positions at `stays`
 /// (s). All of these lie inside the positions of the timeline, within `tolerance` s. `None` where no
 /// beginning satisfies this.
-pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option<Begin> {
-    let (from, to) = window(stays, &bounds(plan), 0.0);
+pub(crate) fn begin(stays: &[Span<f64>], plan: &Plan, tolerance: f64) -> Option<Begin> {
+    let Span { from, to } = window(stays, &bounds(plan), 0.0);
     let tolerance = tolerance.max(ROUNDING_S);
     if from - to > 2.0 * tolerance {
         return None;
@@ -48,16 +49,16 @@ pub(crate) fn begin(stays: &[(f64, f64)], plan: &Plan, tolerance: f64) -> Option
     let (from, to) = if from <= to { (from, to) } else { ((from + to) / 2.0, (from + to) / 2.0) };
     let nearest = 0.0_f64.clamp(from, to);
     let at = if nearest.abs() <= ROUNDING_S { 0.0 } else { nearest };
-    let open = (at.abs() > tolerance && to - from > tolerance).then_some((from, to));
+    let open = (at.abs() > tolerance && to - from > tolerance).then_some(Span { from, to });
     // complete rows of a position leave one interval open: its middle is as likely as any other time
-    Some(Begin { at: open.map_or(at, |(from, to)| (from + to) / 2.0), open })
+    Some(Begin { at: open.map_or(at, |open| open.middle()), open })
 }
 
 /// Least and largest excess duration of the positions over the scheme, as a fraction, with which all rows lie
 /// inside them.
-fn rates(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<(f64, f64)> {
+fn rates(stays: &[Span<f64>], bounds: &[Span<f64>], tolerance: f64) -> Option<Span<f64>> {
     let beyond = |rate: f64| {
-        let (from, to) = window(stays, bounds, rate);
+        let Span { from, to } = window(stays, bounds, rate);
         from - to - 2.0 * tolerance
     };
     // convex in the rate
@@ -75,12 +76,12 @@ fn rates(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<
         }
         inside
     };
-    (beyond(best) <= 0.0).then(|| (end(-FASTEST), end(FASTEST)))
+    (beyond(best) <= 0.0).then(|| Span { from: end(-FASTEST), to: end(FASTEST) })
 }
 
 /// Middle of these excess durations.
-fn rate(stays: &[(f64, f64)], bounds: &[(f64, f64)], tolerance: f64) -> Option<f64> {
-    rates(stays, bounds, tolerance).map(|(low, high)| (low + high) / 2.0)
+fn rate(stays: &[Span<f64>], bounds: &[Span<f64>], tolerance: f64) -> Option<f64> {
+    rates(stays, bounds, tolerance).map(|rates| rates.middle())
 }
 
 /// Duration of the slew to each position, in s.
@@ -94,45 +95,45 @@ pub(crate) fn slews(plan: &Plan) -> Vec<f64> {
 
 /// Ends of positions with other durations than in the scheme: the last row of each or, where rows are missing
 /// behind it, as many intervals later as a common rate requires. `after` has the next row of any kind.
-pub(crate) fn ends(stays: &mut [(f64, f64)], after: &[f64], plan: &Plan, interval: f64, tolerance: f64) {
+pub(crate) fn ends(stays: &mut [Span<f64>], after: &[f64], plan: &Plan, interval: f64, tolerance: f64) {
     let (own, slews) = (bounds(plan), slews(plan));
     let Some(rate) = rate(stays, &own, tolerance) else { return };
-    let (from, to) = window(stays, &own, rate);
+    let begin = window(stays, &own, rate).middle();
     for p in 0..stays.len() {
         let Some(next) = stays.get(p + 1) else { break };
-        let room = (next.0 - slews[p + 1]).min(after[p]) - stays[p].1;
-        let by = (1.0 + rate) * own[p].1 + (from + to) / 2.0 - stays[p].1;
+        let room = (next.from - slews[p + 1]).min(after[p]) - stays[p].to;
+        let by = (1.0 + rate) * own[p].to + begin - stays[p].to;
         // the next row is no longer at the position
         let most = ((room / interval - 0.5).floor()).max(0.0);
-        stays[p].1 += (by / interval).floor().clamp(0.0, most) * interval;
+        stays[p].to += (by / interval).floor().clamp(0.0, most) * interval;
     }
 }
 
 /// Least and largest excess duration of all positions over the scheme, as a fraction, with which the rows of
 /// all of them lie inside; `None` where no such rate exists.
-pub(crate) fn by_rows(stays: &[(f64, f64)], plan: &Plan) -> Option<(f64, f64)> {
+pub(crate) fn by_rows(stays: &[Span<f64>], plan: &Plan) -> Option<Span<f64>> {
     rates(stays, &bounds(plan), ROUNDING_S)
 }
 
 /// Narrows what the rows beside a change of position leave open, if all positions last equally many times as
 /// long as in the scheme: such a clock has one beginning, which the rows of all positions bound. `slews` has
 /// the duration of the slew to each position by the clock of the record.
-pub(crate) fn narrow(stays: &mut [(f64, f64)], plan: &Plan, slews: &[f64]) {
+pub(crate) fn narrow(stays: &mut [Span<f64>], plan: &Plan, slews: &[f64]) {
     let own = bounds(plan);
-    let Some((low, high)) = rates(stays, &own, ROUNDING_S) else { return };
+    let Some(all) = rates(stays, &own, ROUNDING_S) else { return };
     // earliest and latest end of each position over all clocks
-    let clocks: Vec<(f64, (f64, f64))> = (0..=CLOCKS)
-        .map(|k| low + (high - low) * k as f64 / CLOCKS as f64)
+    let clocks: Vec<(f64, Span<f64>)> = (0..=CLOCKS)
+        .map(|k| all.from + all.length() * k as f64 / CLOCKS as f64)
         .map(|rate| (rate, window(stays, &own, rate)))
         .collect();
     for p in 0..stays.len().saturating_sub(1) {
-        let ends = clocks.iter().map(|(rate, (from, to))| ((1.0 + rate) * own[p].1 + from, to - from));
+        let ends = clocks.iter().map(|(rate, begin)| ((1.0 + rate) * own[p].to + begin.from, begin.length()));
         let (earliest, latest) = ends
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), (end, open)| {
                 (least.min(end), most.max(end + open))
             });
-        stays[p].1 = stays[p].1.max(earliest);
-        stays[p + 1].0 = stays[p + 1].0.min(latest + slews[p + 1]).max(stays[p].1 + slews[p + 1]);
+        stays[p].to = stays[p].to.max(earliest);
+        stays[p + 1].from = stays[p + 1].from.min(latest + slews[p + 1]).max(stays[p].to + slews[p + 1]);
     }
 }
 
@@ -218,13 +219,14 @@ mod tests {
 
     #[test]
     fn windows_and_rates() {
-        let own = [(0.0, 100.0), (110.0, 210.0), (220.0, 320.0)];
-        let stays = [(1003.0, 1100.0), (1113.0, 1209.0), (1223.0, 1320.0)];
-        assert_eq!(window(&stays, &own, 0.0), (1000.0, 1003.0));
-        let slow = stays.map(|(a, b)| (0.98 * a, 0.98 * b));
+        let own = [(0.0, 100.0), (110.0, 210.0), (220.0, 320.0)].map(Span::from);
+        let stays = [(1003.0, 1100.0), (1113.0, 1209.0), (1223.0, 1320.0)].map(Span::from);
+        assert_eq!(window(&stays, &own, 0.0), (1000.0, 1003.0).into());
+        let slow = stays.map(|s| Span { from: 0.98 * s.from, to: 0.98 * s.to });
         let found = rate(&slow, &own, 0.0).expect("a rate");
         assert!(
-            (found + 0.02).abs() < 0.01 && rate(&[(0.0, 10.0), (400.0, 450.0)], &own[..2], 0.0).is_none()
+            (found + 0.02).abs() < 0.01
+                && rate(&[(0.0, 10.0), (400.0, 450.0)].map(Span::from), &own[..2], 0.0).is_none()
         );
     }
 

@@ -4,7 +4,7 @@
 use parquet::record::Field;
 use sha2::{Digest, Sha256};
 
-use super::columns::{MOST, RecordColumn, TIME, Wanted, place};
+use super::columns::{MOST, RecordColumn, TIME, TIME_INDEX, Wanted, place};
 use super::error::{RecordError, RecordPlace};
 
 /// Check of the rows of a record, one after the other, with their digest.
@@ -51,8 +51,8 @@ impl<'a> RowCheck<'a> {
         for (i, (slot, w)) in numbers.iter_mut().zip(self.wanted).enumerate() {
             *slot = self.number(line, i, cell(w.column))?;
         }
-        let Some(t) = numbers[0] else {
-            let (place, found) = (self.at(line, 0), String::new());
+        let Some(t) = numbers[TIME_INDEX] else {
+            let (place, found) = (self.at(line, TIME_INDEX), String::new());
             return Err(RecordError::Number { place, expected: TIME, found });
         };
         if self.anew && label != self.last {
@@ -61,9 +61,9 @@ impl<'a> RowCheck<'a> {
         }
         if t <= self.before {
             // as written, without the rounding of the scale
-            let written = |t: f64| (t / self.wanted[0].scale * 1e9).round() / 1e9;
+            let written = |t: f64| (t / self.wanted[TIME_INDEX].scale * 1e9).round() / 1e9;
             let (found, before) = (written(t).to_string(), written(self.before).to_string());
-            return Err(RecordError::Time { place: self.at(line, 0), found, before });
+            return Err(RecordError::Time { place: self.at(line, TIME_INDEX), found, before });
         }
         (self.before, self.any) = (t, true);
         self.add(&numbers);
@@ -80,7 +80,7 @@ impl<'a> RowCheck<'a> {
             }
             CellContent::Nothing => Ok(None),
             CellContent::Text(found) => {
-                let expected = if i == 0 { TIME } else { "a number" };
+                let expected = if i == TIME_INDEX { TIME } else { "a number" };
                 Err(RecordError::Number { place: self.at(line, i), expected, found })
             }
         }

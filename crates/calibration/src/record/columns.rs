@@ -60,6 +60,21 @@ pub struct RecordRow<'a> {
     pub label: &'a str,
 }
 
+/// Index of the time among the requested numbers: every reader requests it first.
+pub(crate) const TIME_INDEX: usize = 0;
+
+impl RecordRow<'_> {
+    /// Time of the row; `None` for an empty cell.
+    pub fn time(&self) -> Option<f64> {
+        self.numbers[TIME_INDEX]
+    }
+
+    /// Requested numbers behind the time.
+    pub fn values(&self) -> &[Option<f64>] {
+        &self.numbers[TIME_INDEX + 1..]
+    }
+}
+
 /// Most columns that an error lists.
 pub(super) const LISTED: usize = 40;
 

@@ -31,6 +31,7 @@ use cells::text_of;
 use cells::{CellContent, RowCheck};
 use columns::{LISTED, columns, place};
 
+pub(crate) use columns::TIME_INDEX;
 pub use columns::{MOST, RecordColumn, RecordRow, Wanted};
 pub use error::{RecordError, RecordPlace};
 

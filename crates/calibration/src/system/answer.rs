@@ -1,6 +1,8 @@
 //! Answer of a calibration of a system, and the reasons why there is none.
 
 use obsdeg_core::degree::Status;
+use obsdeg_core::json_list;
+use obsdeg_core::span::Span;
 use obsdeg_core::system::ModelError;
 use obsdeg_ekf::EkfError;
 use schemars::JsonSchema;
@@ -36,7 +38,7 @@ pub struct SystemCalibration {
     /// Number of degrees of freedom: measurements minus determined unknowns.
     pub degrees_of_freedom: usize,
     /// Acceptance band of 99.9 % of chi-square per degree of freedom, dimensionless.
-    pub band: (f64, f64),
+    pub band: Span<f64>,
     /// Root of chi-square per degree of freedom, dimensionless; 1 is expected.
     pub factor: f64,
     /// Quality of the fit of each output.
@@ -44,7 +46,7 @@ pub struct SystemCalibration {
     /// Other solutions that fit nearly as well, the best first: the values of the unknowns.
     pub others: Vec<OtherSolution>,
     /// Number of starts that were tried, then the number that led to the solution.
-    pub starts: (usize, usize),
+    pub starts: TriedStarts,
     /// Ends of the starts that did not lead to the solution.
     pub other_starts: OtherStarts,
     /// Largest number of starts; fewer are enough when no other solution is to be expected.
@@ -214,10 +216,32 @@ pub struct Profile {
     pub name: String,
     /// Value of the unknown, in its unit, and the sum of squares there minus that at the solution,
     /// dimensionless.
-    pub points: Vec<(f64, f64)>,
+    pub points: Vec<ProfilePoint>,
     /// True if the profile is flat: no value changes the sum of squares by more than 0.01.
     pub flat: bool,
 }
+
+/// Point of a profile; in JSON `[value, rise]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProfilePoint {
+    /// Value of the unknown, in its unit.
+    pub value: f64,
+    /// Sum of squares there minus that at the solution, dimensionless.
+    pub rise: f64,
+}
+
+json_list!(ProfilePoint { value: f64, rise: f64 });
+
+/// Number of starts of a search; in JSON `[tried, led]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TriedStarts {
+    /// Number of starts that were tried.
+    pub tried: usize,
+    /// Number of these that led to the solution.
+    pub led: usize,
+}
+
+json_list!(TriedStarts { tried: usize, led: usize });
 
 /// Residual of one measurement.
 #[derive(Debug, Clone, PartialEq)]

@@ -221,7 +221,7 @@ impl RowReader<'_> {
     /// Adds a row.
     fn take(&mut self, row: &RecordRow<'_>) -> Result<(), SystemCalibrationError> {
         let experiment = self.experiment(row)?;
-        let t = row.numbers[0].unwrap_or(f64::NAN);
+        let t = row.time().unwrap_or(f64::NAN);
         let (_, time) = self.reached[experiment];
         let segment = self.segment(row, experiment)?;
         if t <= time {

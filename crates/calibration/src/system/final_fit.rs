@@ -1,6 +1,7 @@
 //! Final fit of a system: its free unknowns, and which functionals it determines.
 
 use obsdeg_core::degree::{Status, Verdict};
+use obsdeg_core::span::Span;
 use obsdeg_ekf::consistency::chi_square_band;
 
 use super::answer::SystemEstimated;
@@ -57,10 +58,9 @@ impl FinalFit {
     }
 
     /// Band of chi-square per degree of freedom.
-    pub(super) fn band(&self) -> (f64, f64) {
+    pub(super) fn band(&self) -> Span<f64> {
         let free = self.degrees_of_freedom as f64;
-        let band = chi_square_band(free, 1.0, 1.0 - levels::NOISE);
-        (band.0 / free, band.1 / free)
+        Span::from(chi_square_band(free, 1.0, 1.0 - levels::NOISE)).over(free)
     }
 
     /// Estimate of a functional by its name and unit.

@@ -33,8 +33,8 @@ use fit::{LONG, Settled, Stuck, SystemProblem, WEAK, rank, settle, step};
 use start::{first_noise, first_start, integration_steps, nowhere, plain};
 
 pub use answer::{
-    OtherSolution, OtherStarts, OutputFit, Profile, StatesStart, SystemCalibration, SystemCalibrationError,
-    SystemEstimated, SystemFinding, SystemResidual,
+    OtherSolution, OtherStarts, OutputFit, Profile, ProfilePoint, StatesStart, SystemCalibration,
+    SystemCalibrationError, SystemEstimated, SystemFinding, SystemResidual, TriedStarts,
 };
 
 /// Most doublings of the number of integration steps.
@@ -183,7 +183,7 @@ impl<'a> Calibrating<'a> {
             factor: fit.mean.sqrt(),
             outputs,
             others,
-            starts: (tried, led),
+            starts: TriedStarts { tried, led },
             other_starts: OtherStarts { failed: tried - ends.len(), ..other_starts },
             starts_at_most: starts.len(),
             profiles,

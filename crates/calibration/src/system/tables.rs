@@ -1,5 +1,6 @@
 //! Tables of the answer: estimates, combinations, covariance, findings, invariants and profiles.
 
+use super::answer::ProfilePoint;
 use nalgebra::DVector;
 use obsdeg_core::degree::{Status, Verdict};
 use obsdeg_core::system::{Judgement, ModelError, invariant_reports, symmetries};
@@ -90,7 +91,7 @@ impl Calibrating<'_> {
         } else if !fit.best.converged {
             out.push(SystemFinding::NotSettled);
         }
-        if !self.all_estimated() && !(band.0..=band.1).contains(&mean) {
+        if !self.all_estimated() && !band.contains(&mean) {
             out.push(SystemFinding::Noise { chi_square: mean, factor: mean.sqrt() });
         }
         for o in outputs {
@@ -183,7 +184,7 @@ impl Calibrating<'_> {
             })?;
             // three sigma, or half of the size where sigma is large
             let width = (3.0 * solution.sigma(&[(j, 1.0)])).min(0.5 * size(best.x[j]));
-            let mut points = vec![(best.x[j], 0.0)];
+            let mut points = vec![ProfilePoint { value: best.x[j], rise: 0.0 }];
             for side in [-1.0, 1.0] {
                 let mut x = best.x.clone();
                 for k in 1..=4 {
@@ -191,14 +192,14 @@ impl Calibrating<'_> {
                     let Ok(end) = settle(&mut self.problem, &self.base, x.clone(), finer, Some(j)) else {
                         break;
                     };
-                    points.push((x[j], end.cost - best.cost));
+                    points.push(ProfilePoint { value: x[j], rise: end.cost - best.cost });
                     x = end.x;
                 }
             }
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            points.sort_by(|a, b| a.value.total_cmp(&b.value));
             // an unknown that constraints alone determine has no other values
-            points.dedup_by(|a, b| a.0 == b.0);
-            let flat = points.len() > 1 && points.iter().all(|p| p.1.abs() < 0.01);
+            points.dedup_by(|a, b| a.value == b.value);
+            let flat = points.len() > 1 && points.iter().all(|p| p.rise.abs() < 0.01);
             out.push(Profile { name: name.clone(), points, flat });
         }
         Ok(out)

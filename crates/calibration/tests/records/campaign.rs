@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use obsdeg_calibration::answer::CalibrationFinding;
+use obsdeg_calibration::answer::HeldUnknown;
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, Options, calibrate};
 use obsdeg_core::model::Carry;
@@ -133,8 +134,7 @@ const BOX: f64 = 2.0;
 
 /// True if the truth of an undetermined unknown is farther than [`BOX`] from its box.
 fn outside(bench: &Bench, c: &Calibration) -> bool {
-    let far =
-        |(name, width, _): &(String, f64, String)| truth(bench, name).is_some_and(|x| x.abs() > BOX * width);
+    let far = |h: &HeldUnknown| truth(bench, &h.name).is_some_and(|x| x.abs() > BOX * h.sigma);
     c.assumed.constrained.iter().any(far)
 }
 

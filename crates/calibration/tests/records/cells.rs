@@ -53,10 +53,11 @@ fn gross_cells(cases: &[(f64, std::ops::Range<usize>, usize)]) {
                 let c = of_csv(&bench, "F,I,O,S", csv(&own)).expect("calibrated");
                 is_near(&bench, &c, &format!("{step_s} s, {column}, {what}"));
                 let line = k as u64 + 2;
-                let outlier = c.outliers.iter().any(|o| o.lines == (line, line) && o.channel == column);
+                let outlier =
+                    c.outliers.iter().any(|o| o.lines == (line, line).into() && o.channel == column);
                 let code = c.findings.iter().any(|f| {
                     matches!(f,
-                    CalibrationFinding::Cells { column: found, lines, .. } if *lines == (line, line) && found == column)
+                    CalibrationFinding::Cells { column: found, lines, .. } if *lines == (line, line).into() && found == column)
                 });
                 assert!(outlier || code, "{step_s} s, {column}, {what}: {:?} {:?}", c.outliers, c.findings);
                 // some samples are far from the line of a dense bin by chance
@@ -106,7 +107,10 @@ fn codes_are_asked_about() {
         else {
             panic!("{:?}", c.findings)
         };
-        assert_eq!((column.as_str(), *value, *lines), ("fy [g]", code, (from as u64 + 2, from as u64 + 13)));
+        assert_eq!(
+            (column.as_str(), *value, *lines),
+            ("fy [g]", code, (from as u64 + 2, from as u64 + 13).into())
+        );
         let recording = obsdeg_core::model::Recording { missing: vec![code], ..Default::default() };
         let stated = with_recording(&bench, recording, csv(&own)).expect("calibrated");
         assert!(stated.consistent, "{:?}", stated.findings);

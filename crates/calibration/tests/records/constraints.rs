@@ -2,6 +2,7 @@
 //! squares.
 
 use nalgebra::{DMatrix, DVector};
+use obsdeg_calibration::system::ProfilePoint;
 use obsdeg_calibration::system::SystemEstimated;
 use obsdeg_calibration::{Before, SystemCalibrationOptions};
 
@@ -231,11 +232,11 @@ fn profiles_and_other_solutions_keep_to_constraints() {
     assert!((c.chi_square / chi(s) - 1.0).abs() < 1e-9);
     let points = &c.profiles[0].points;
     assert_eq!((points.len(), c.profiles[0].flat), (9, false));
-    for (x, more) in points {
+    for ProfilePoint { value: x, rise: more } in points {
         let expected = chi((1.0 - x * x).sqrt()) - chi(s);
         assert!((more - expected).abs() < 1e-4 * (1.0 + expected), "{x}: {more} {expected}");
     }
-    assert!(points.iter().any(|p| p.1 > 5.0));
+    assert!(points.iter().any(|p| p.rise > 5.0));
     let [other] = &c.others[..] else { panic!("{:?}", c.others) };
     assert!((other.values[0] + cos).abs() < 1e-6 && (other.values[1] - s).abs() < 1e-6, "{other:?}");
 }

@@ -2,6 +2,7 @@
 //! itself, compared with other computations.
 
 use nalgebra::DMatrix;
+use obsdeg_calibration::answer::HeldUnknown;
 use obsdeg_calibration::answer::{CalibrationFinding, ForceError};
 use obsdeg_calibration::platform::{Mistaken, read_records};
 use obsdeg_calibration::record::Record;
@@ -283,7 +284,10 @@ fn a_step_is_no_row_of_outliers() {
         });
         let (position, count, sigmas) = named.unwrap_or_else(|| panic!("{:?} {:?}", c.findings, c.outliers));
         assert!(position == "p3" && (4..=8).contains(&count), "{position} {count}");
-        assert!(sigmas.0.abs() > 2.0 && sigmas.1.abs() < 25.0 && sigmas.0 * sigmas.1 > 0.0, "{sigmas:?}");
+        assert!(
+            sigmas.from.abs() > 2.0 && sigmas.to.abs() < 25.0 && sigmas.from * sigmas.to > 0.0,
+            "{sigmas:?}"
+        );
     }
 }
 
@@ -549,13 +553,13 @@ fn shifted_labels_are_found() {
     assert_eq!(to, end);
     let (end, many) = spiked(&Bench { step_s: 0.5, ..bench });
     let c = many.expect("calibrated");
-    assert!(c.consistent && c.outliers.iter().any(|o| o.lines == (end, end)), "{:?}", c.outliers);
+    assert!(c.consistent && c.outliers.iter().any(|o| o.lines == (end, end).into()), "{:?}", c.outliers);
 }
 
 /// Calibration as the prior of another.
 pub(crate) fn before(c: &Calibration) -> Before<Setup> {
     Before {
-        priors: c.assumed.priors.iter().map(|p| p.0.clone()).collect(),
+        priors: c.assumed.priors.iter().map(|p| p.name.clone()).collect(),
         estimates: c.covariance.clone(),
         rests_on: c.rests_on.clone(),
         of: c.setup.clone(),
@@ -733,14 +737,13 @@ fn what_is_held_is_said() {
     // every determined combination leaves one of its unknowns free
     let mut free: Vec<&str> = Vec::new();
     for combination in c.combinations.iter().filter(|e| e.determined) {
-        let part =
-            |h: &&(String, f64, String)| combination.name.contains(&h.0) && !free.contains(&h.0.as_str());
-        free.push(&c.assumed.constrained.iter().find(part).expect("an open unknown").0);
+        let part = |h: &&HeldUnknown| combination.name.contains(&h.name) && !free.contains(&h.name.as_str());
+        free.push(&c.assumed.constrained.iter().find(part).expect("an open unknown").name);
     }
     assert_eq!(c.assumed.constrained.len() - free.len(), 7, "{:?}", c.assumed.constrained);
     let mut own = conditions(&bench);
-    let known = c.assumed.constrained.iter().filter(|h| !free.contains(&h.0.as_str()));
-    own.priors = known.map(|h| Assignment { name: h.0.clone(), value: 1e-6 }).collect();
+    let known = c.assumed.constrained.iter().filter(|h| !free.contains(&h.name.as_str()));
+    own.priors = known.map(|h| Assignment { name: h.name.clone(), value: 1e-6 }).collect();
     let record = Record::csv("run.csv", Box::new(std::io::Cursor::new(text))).expect("a record");
     let known = calibrate(&scheme(&bench, "F,I,O,S"), &own, vec![record], &Options::default(), &|_| true)
         .expect("calibrated");

@@ -114,8 +114,8 @@ fn what_is_not_distinguished_has_its_product() {
     assert!((a - 6.0).abs() < 4.0 * s);
     // one solution by the determined combinations: not all starts are needed
     let o = &own.other_starts;
-    assert_eq!(own.starts.1 + o.near + o.higher + o.unsettled + o.failed, own.starts.0, "{o:?}");
-    assert!(own.starts.0 < 16 && own.starts.1 > 6 && own.starts_at_most == 16, "{:?}", own.starts);
+    assert_eq!(own.starts.led + o.near + o.higher + o.unsettled + o.failed, own.starts.tried, "{o:?}");
+    assert!(own.starts.tried < 16 && own.starts.led > 6 && own.starts_at_most == 16, "{:?}", own.starts);
 }
 
 /// Times and columns in another unit than the model's are converted, or refused with both units. A prior

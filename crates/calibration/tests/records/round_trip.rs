@@ -1,6 +1,7 @@
 //! From a bench to a record to an estimate: the estimate equals the truth of the bench within its sigmas.
 
 use nalgebra::{DMatrix, DVector};
+use obsdeg_calibration::answer::ResidualDeviation;
 use obsdeg_calibration::answer::{CalibrationFinding, PositionsBy};
 use obsdeg_calibration::record::Record;
 use obsdeg_calibration::{Calibration, CalibrationError, CalibrationProgress, Options, calibrate};
@@ -289,12 +290,12 @@ fn faults_are_named() {
     for k in [100, 700] {
         let line = k as u64 + 2;
         assert!(
-            c.outliers.iter().any(|o| (o.lines.0..=o.lines.1).contains(&line)),
+            c.outliers.iter().any(|o| (o.lines.from..=o.lines.to).contains(&line)),
             "{line}: {:?}",
             c.outliers
         );
     }
-    assert!(c.outliers.iter().all(|o| [102, 702].iter().any(|l| (o.lines.0..=o.lines.1).contains(l))));
+    assert!(c.outliers.iter().all(|o| [102, 702].iter().any(|l| (o.lines.from..=o.lines.to).contains(l))));
     for (a, b) in right.quantities.iter().zip(&c.quantities) {
         assert!(
             (a.estimate.expect("there") - b.estimate.expect("there")).abs() < a.sigma.expect("there"),
@@ -528,8 +529,8 @@ fn what_is_held_bends_little() {
         assert!(c.consistent, "{:?}", c.findings);
         assert!(errors(&bench, c).iter().all(|(_, e)| e.abs() < 3.5), "{:?}", errors(&bench, c));
     }
-    let moved = a.assumed.constrained.iter().filter(|h| OPEN.contains(&h.0.as_str()));
-    let distance = moved.map(|(_, width, _)| (10.0 / width).powi(2)).sum::<f64>().sqrt();
+    let moved = a.assumed.constrained.iter().filter(|h| OPEN.contains(&h.name.as_str()));
+    let distance = moved.map(|h| (10.0 / h.sigma).powi(2)).sum::<f64>().sqrt();
     let mut compared = 0;
     for (u, v) in a.quantities.iter().chain(&a.combinations).zip(b.quantities.iter().chain(&b.combinations)) {
         assert_eq!((&u.name, u.determined), (&v.name, v.determined));
@@ -609,7 +610,8 @@ fn an_interrupt_leaves_what_there_is() {
         assert!(s.points.len() <= 1000 && s.count == s.points.len() && s.autocorrelation.len() == 20);
         let band = 4.0 / (s.count as f64).sqrt();
         assert!(s.autocorrelation.iter().all(|r| r.abs() < band), "{:?}", s.autocorrelation);
-        for (k, (tau, found, white)) in s.allan.iter().enumerate() {
+        for (k, point) in s.allan.iter().enumerate() {
+            let ResidualDeviation { tau_s: tau, deviation: found, white } = point;
             assert!((tau / 10.0 - f64::from(1 << k)).abs() < 0.1, "{tau}");
             // for n/m clusters
             let scatter = 4.0 * (tau / 10.0 / s.count as f64).sqrt();

@@ -1,11 +1,10 @@
 //! Options of `obsdeg design`, as arguments and in JSON.
 
-use std::fmt;
 use std::ops::RangeInclusive;
-use std::str::FromStr;
 
 use clap::{ArgGroup, Args};
 use obsdeg_core::model::ranges::{SLEW_RATE_DEG_S, TURN_DEG};
+use obsdeg_design::DegreeCap;
 use obsdeg_design::design::{CriterionName, Immune};
 use serde::{Deserialize, Serialize};
 
@@ -248,7 +247,7 @@ impl WantedOptions {
     ///
     /// # Errors
     /// [`Problem`] of a name that is given twice.
-    pub(super) fn degree_caps(&self) -> Result<Vec<(Option<String>, usize)>, Problem> {
+    pub(super) fn degree_caps(&self) -> Result<Vec<DegreeCap>, Problem> {
         for (i, cap) in self.max_degree.iter().enumerate() {
             if let Some(before) = self.max_degree[..i].iter().find(|c| c.name == cap.name) {
                 return Err(Problem::input(format!(
@@ -256,36 +255,7 @@ impl WantedOptions {
                 )));
             }
         }
-        Ok(self.max_degree.iter().map(|c| (c.name.clone(), c.cap)).collect())
-    }
-}
-
-/// Largest degree of one coefficient or family, or of all that are required: `D_F=1`, `1`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DegreeCap {
-    /// Coefficient or family; `None` stands for all required coefficients.
-    pub name: Option<String>,
-    /// Largest degree allowed.
-    pub cap: usize,
-}
-
-impl fmt::Display for DegreeCap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.name {
-            Some(name) => write!(f, "{name}={}", self.cap),
-            None => write!(f, "{}", self.cap),
-        }
-    }
-}
-
-impl FromStr for DegreeCap {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (name, cap) = text.split_once('=').map_or((None, text), |(name, cap)| (Some(name.trim()), cap));
-        let cap =
-            cap.trim().parse().map_err(|_| format!("expected a degree, as in 1 or D_F=1, found `{text}`"))?;
-        Ok(Self { name: name.map(Into::into), cap })
+        Ok(self.max_degree.clone())
     }
 }
 

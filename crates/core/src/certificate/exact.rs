@@ -201,7 +201,7 @@ impl<'a> FiltrationPoints<'a> {
                 return None;
             }
             for (slot, &row) in out.iter_mut().zip(rows) {
-                let power = weight - filtration.basis[row].0.1 as i32;
+                let power = weight - filtration.basis[row].0.order as i32;
                 slot.extend(self.terms(power, |field, embedding, point| y[field][embedding][point][row])?);
             }
         }

@@ -5,7 +5,9 @@ mod exact;
 mod model;
 mod witness;
 
-pub use model::{CertifiedModel, ModelCertificate, Operation, certify_model};
+pub use model::{
+    CertifiedInput, CertifiedModel, CertifiedOutput, ModelCertificate, Operation, certify_model,
+};
 
 use std::collections::BTreeMap;
 
@@ -32,8 +34,39 @@ pub const LAYOUT: &str = "obsdeg.certificate/1";
 /// Largest number of unknowns of a certificate.
 pub(crate) const MOST_UNKNOWNS: usize = 300;
 
-/// Derivative row: segment (from 1), derivative order, component of Z.
-pub type RowName = (usize, usize, usize);
+/// Name of a derivative row; in JSON `[segment, order, component]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RowName {
+    /// Number of the segment, from 1.
+    pub segment: usize,
+    /// Derivative order.
+    pub order: usize,
+    /// Component of Z; of a model the number of the output, from 1.
+    pub component: usize,
+}
+
+crate::json_list!(RowName { segment: usize, order: usize, component: usize });
+
+/// Row of the basis with its pivot; in JSON `[segment, order, component, pivot]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BasisRow {
+    /// Number of the segment, from 1.
+    pub segment: usize,
+    /// Derivative order.
+    pub order: usize,
+    /// Component of Z; of a model the number of the output, from 1.
+    pub component: usize,
+    /// Name of the unknown that is the pivot.
+    pub pivot: String,
+}
+
+crate::json_list!(BasisRow { segment: usize, order: usize, component: usize, pivot: String });
+
+impl BasisRow {
+    fn new(RowName { segment, order, component }: RowName, pivot: &str) -> Self {
+        Self { segment, order, component, pivot: pivot.into() }
+    }
+}
 
 /// Exact number: a sum of terms `[p, q, r, a, b]`, each `p/q sqrt(r) wN^a wU^b`.
 pub(crate) type ExactNumber = Vec<[i64; 5]>;
@@ -55,7 +88,7 @@ pub struct Certificate {
     /// Ranks of the rows of order at most 0, 1, ..., K; higher orders add nothing.
     pub ranks: Vec<usize>,
     /// Basis rows: segment (from 1), derivative order, component of Z, name of the pivot unknown.
-    pub basis: Vec<(usize, usize, usize, String)>,
+    pub basis: Vec<BasisRow>,
     /// Null vectors of the rows of order at most 0, 1, ..., K, one per unknown that is no pivot; null if the
     /// kind is modular.
     pub null_vectors: Option<Vec<Vec<ExactVector>>>,
@@ -334,7 +367,7 @@ fn written(
         unknowns: names.to_vec(),
         kind: if exactly { Kind::Exact } else { Kind::Modular },
         ranks: filtration.ranks.clone(),
-        basis: filtration.basis.iter().map(|&((i, k, c), pivot)| (i, k, c, names[pivot].clone())).collect(),
+        basis: filtration.basis.iter().map(|&(row, pivot)| BasisRow::new(row, &names[pivot])).collect(),
         null_vectors,
         verdicts,
         combinations: combinations.collect(),

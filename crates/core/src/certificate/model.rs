@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::witness::{Filtration, WitnessedVerdict};
-use super::{CertificateError, CertifiedUnknown, MOST_UNKNOWNS, RowName, not_covered, proof, text};
+use super::{BasisRow, CertificateError, CertifiedUnknown, MOST_UNKNOWNS, RowName, not_covered, proof, text};
 use crate::degree::ensemble::EnsembleError;
 use crate::degree::rows::DerivativeRows;
 use crate::findings::AnalysisError;
@@ -32,7 +32,7 @@ pub struct ModelCertificate {
     /// Ranks of the rows of order at most 0, 1, ..., K; higher orders add nothing.
     pub ranks: Vec<usize>,
     /// Basis rows: 1, derivative order, number of the output (from 1), name of the pivot unknown.
-    pub basis: Vec<(usize, usize, usize, String)>,
+    pub basis: Vec<BasisRow>,
     /// Verdict and witness for every unknown, in the order of the unknowns.
     pub verdicts: Vec<CertifiedUnknown>,
 }
@@ -49,14 +49,36 @@ pub struct CertifiedModel {
     pub constants: Vec<String>,
     /// Known inputs: name, and degree of the polynomial in time (dimensionless), or null for a generic
     /// function of time.
-    pub inputs: Vec<(String, Option<usize>)>,
+    pub inputs: Vec<CertifiedInput>,
     /// Operations, each on values before it.
     pub program: Vec<Operation>,
     /// For each state the index of the value that is its derivative.
     pub rates: Vec<usize>,
     /// Outputs: name, and number of the value.
-    pub outputs: Vec<(String, usize)>,
+    pub outputs: Vec<CertifiedOutput>,
 }
+
+/// Known input of a certificate; in JSON `[name, degree]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CertifiedInput {
+    /// Name of the input.
+    pub name: String,
+    /// Degree of the polynomial in time, dimensionless; `None` for a generic function of time.
+    pub degree: Option<usize>,
+}
+
+crate::json_list!(CertifiedInput { name: String, degree: Option<usize> });
+
+/// Output of a certificate; in JSON `[name, value]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CertifiedOutput {
+    /// Name of the output.
+    pub name: String,
+    /// Number of the value that it is, from 0.
+    pub value: usize,
+}
+
+crate::json_list!(CertifiedOutput { name: String, value: usize });
 
 /// Operation of a straight-line program, dimensionless.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -109,7 +131,7 @@ pub fn certify_model(model: &SystemModel, seed: u64) -> Result<ModelCertificate,
         unknown: name.clone(),
         proof: proof(found, None, &filtration, &unknowns),
     });
-    let basis = filtration.basis.iter().map(|&((i, k, c), pivot)| (i, k, c, unknowns[pivot].clone()));
+    let basis = filtration.basis.iter().map(|&(row, pivot)| BasisRow::new(row, &unknowns[pivot]));
     Ok(ModelCertificate {
         layout: LAYOUT.into(),
         verdicts: verdicts.collect(),
@@ -221,12 +243,16 @@ fn problem(model: &SystemModel, compiled: &Compiled, judgement: &Judgement) -> (
     };
     let rates = states.iter().enumerate().map(|entry| rate(&mut program, entry)).collect();
     let outputs = model.outputs.iter().zip(compiled.outputs(0));
-    let outputs = outputs.map(|((named, _), &node)| (named.name.clone(), program.node(node))).collect();
+    let outputs = outputs
+        .map(|((named, _), &node)| CertifiedOutput { name: named.name.clone(), value: program.node(node) });
+    let outputs = outputs.collect();
+    let input =
+        |&i: &usize| CertifiedInput { name: model.known_inputs[i].0.name.clone(), degree: degree(model, i) };
     let problem = CertifiedModel {
         states: names(&states),
         parameters: names(&parameters),
         constants: constants.iter().map(|&c| model.constants[c].0.name.clone()).collect(),
-        inputs: inputs.iter().map(|&i| (model.known_inputs[i].0.name.clone(), degree(model, i))).collect(),
+        inputs: inputs.iter().map(input).collect(),
         program: program.operations,
         rates,
         outputs,
@@ -329,7 +355,8 @@ fn witness(
         let more = space.rank() < columns.len()
             && source.emit(order, &mut |row| {
                 output += 1;
-                rows.push(((1, order, output), columns.iter().map(|&c| row[c]).collect()));
+                let name = RowName { segment: 1, order, component: output };
+                rows.push((name, columns.iter().map(|&c| row[c]).collect()));
                 space.insert(row)
             });
         if !more {

@@ -50,7 +50,7 @@ fn all_rows(platform: &Platform, sample: &FieldSample) -> Vec<(RowName, Vec<u64>
                 for (k, &column) in block.columns.iter().enumerate() {
                     row[column] = block.entry(&field, functional, k);
                 }
-                out.push(((i + 1, order, *component), row));
+                out.push((RowName { segment: i + 1, order, component: *component }, row));
             }
         }
         for (_, functional) in &mut outputs {
@@ -73,8 +73,8 @@ impl Filtration {
         let mut space = Echelon::new(field, columns);
         let (mut basis, mut of_basis, mut ranks, mut spaces) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for order in 0..=rows.iter().map(|r| r.0.1).max().unwrap_or(0) {
-            for (index, (name, row)) in rows.iter().enumerate().filter(|(_, r)| r.0.1 == order) {
+        for order in 0..=rows.iter().map(|r| r.0.order).max().unwrap_or(0) {
+            for (index, (name, row)) in rows.iter().enumerate().filter(|(_, r)| r.0.order == order) {
                 if space.insert(row) {
                     basis.extend(space.pivots().last().map(|pivot| (*name, pivot)));
                     of_basis.push(index);

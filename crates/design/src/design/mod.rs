@@ -16,11 +16,11 @@ mod run;
 mod search;
 
 pub use answer::*;
-pub use certificate::{Bound, Everywhere};
+pub use certificate::{Bound, Everywhere, ListedWeights, WeightedAttitude};
 pub use measure::criterion::{Criterion, SigmaLimits};
 pub use measure::evaluator::{Evaluator, SequenceState};
 pub use measure::stop::Stop;
-pub use nearest::Nearest;
+pub use nearest::{Nearest, TriedCandidates};
 pub use observable::rows::{AttitudeRows, EnumerationLimits};
 pub use observable::slew_sequences::{
     ShortestSlewSequence, SlewSequenceOptions, is_slew_sequence, scheme_of_slew_sequence,

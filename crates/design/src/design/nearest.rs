@@ -24,11 +24,20 @@ pub struct Nearest {
     pub most: usize,
     /// Other candidates that were tried, as `--candidates` names them, with their best scheme of the
     /// same number of positions.
-    pub candidates: Vec<(String, Option<Found>)>,
+    pub candidates: Vec<TriedCandidates>,
     /// Number of sequences that were evaluated.
     pub examined: u64,
     /// True if the search was interrupted or reached its limit of work before all was tried.
     pub unfinished: bool,
+}
+
+/// Other candidates that were tried, with their best scheme.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TriedCandidates {
+    /// Candidates, as `--candidates` names them.
+    pub name: String,
+    /// Best scheme of the same number of positions; `None` if none was found.
+    pub best: Option<Found>,
 }
 
 /// Text `margin 0.71 (D_SX)`, or the coefficients that are not determined.
@@ -81,8 +90,8 @@ impl fmt::Display for Nearest {
             )?,
             None => writeln!(f, "positions: no scheme of up to {} was found that meets all", self.most)?,
         }
-        for (name, found) in &self.candidates {
-            write_candidates(f, name, found.as_ref())?;
+        for tried in &self.candidates {
+            write_candidates(f, &tried.name, tried.best.as_ref())?;
         }
         let ended = if self.unfinished { "; not all was tried" } else { "" };
         write!(

@@ -169,6 +169,15 @@ pub struct Alternatives {
     pub refused: Vec<DesignError>,
 }
 
+/// Run of the filter of a model, sample by sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelRun {
+    /// Estimates and consistency.
+    pub run: SystemRun,
+    /// Estimates and sigmas over the samples.
+    pub traces: Traces,
+}
+
 /// Review of one model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelReview {
@@ -177,7 +186,7 @@ pub struct ModelReview {
     /// Exact verdicts.
     pub analysis: SystemAnalysis,
     /// One run of the filter, sample by sample; `None` without one.
-    pub run: Option<(SystemRun, Traces)>,
+    pub run: Option<ModelRun>,
     /// Verdicts against the information of the samples; `None` without them.
     pub evidence: Option<SystemEvidence>,
     /// Reason why there is no run, or no evidence; `None` if there are both.

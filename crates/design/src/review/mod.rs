@@ -423,7 +423,7 @@ fn model(model: &SystemModel, seed: u64) -> Result<ModelReview, ModelError> {
         }
     };
     let run = match run {
-        Ok(run) => Some(run),
+        Ok((run, traces)) => Some(ModelRun { run, traces }),
         Err(e) => unless_wrong(e).map(|()| None)?,
     };
     let evidence = match evidence {

@@ -60,8 +60,8 @@ pub struct SensorOptions {
     pub own_outputs: bool,
     /// Unknowns that must be observable; if empty, all unknowns.
     pub required: Vec<String>,
-    /// Largest degrees: of one unknown, or of all others (`None`).
-    pub max_degree: Vec<(Option<String>, usize)>,
+    /// Largest degrees of unknowns, or of all others.
+    pub max_degree: Vec<DegreeCap>,
     /// True if every required unknown must have one solution.
     pub unique: bool,
     /// Largest number of minimal sets in the list.
@@ -305,9 +305,9 @@ impl SensorTask<'_> {
     /// and listed.
     fn require(&mut self) -> Result<Vec<Unattainable>, SensorError> {
         let mut limits = vec![NONE - 1; self.asked.len()];
-        for (name, most) in widest_first(&self.options.max_degree) {
+        for DegreeCap { name, cap } in widest_first(&self.options.max_degree) {
             let of = name.as_ref().map_or_else(|| Ok((0..limits.len()).collect()), |n| self.named(n))?;
-            let most = u16::try_from(*most).unwrap_or(NONE - 1).min(NONE - 1);
+            let most = u16::try_from(*cap).unwrap_or(NONE - 1).min(NONE - 1);
             of.into_iter().for_each(|u| limits[u] = most);
         }
         let mut required: Vec<usize> = match self.options.required.is_empty() {
@@ -319,7 +319,7 @@ impl SensorTask<'_> {
         };
         required.sort_unstable();
         required.dedup();
-        for name in self.options.max_degree.iter().filter_map(|(name, _)| name.as_ref()) {
+        for name in self.options.max_degree.iter().filter_map(|c| c.name.as_ref()) {
             if !self.named(name)?.iter().any(|u| required.contains(u)) {
                 let required = self.options.required.clone();
                 return Err(SensorError::NotRequired { name: name.clone(), required });
@@ -455,11 +455,7 @@ impl SensorTask<'_> {
 
     /// Largest degrees asked for, as a user writes them.
     fn caps_in_words(&self) -> Vec<String> {
-        let word = |(name, k): &DegreeCap| match name {
-            Some(name) => format!("{name}={k}"),
-            None => k.to_string(),
-        };
-        self.options.max_degree.iter().map(word).collect()
+        self.options.max_degree.iter().map(ToString::to_string).collect()
     }
 
     fn answer(&mut self) -> Result<Sensors, SensorError> {

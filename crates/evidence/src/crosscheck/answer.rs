@@ -1,8 +1,10 @@
 //! Evidence for and against the exact verdicts, as plain data.
 
 use obsdeg_core::degree::Status;
+use obsdeg_core::json_list;
 use obsdeg_core::model::Carry;
 use obsdeg_core::model::settings::FilterKind;
+use obsdeg_core::span::Span;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -273,9 +275,9 @@ pub struct Statistic {
     /// Average over runs and samples, dimensionless.
     pub measured: f64,
     /// Band of 95 % of the average, dimensionless.
-    pub band: (f64, f64),
+    pub band: Span<f64>,
     /// Acceptance band of 99.9 % of the average, dimensionless.
-    pub wide_band: (f64, f64),
+    pub wide_band: Span<f64>,
     /// True if `measured` lies inside its acceptance band.
     pub pass: bool,
 }
@@ -341,7 +343,7 @@ pub struct Control {
     /// Mean NIS of the filter, dimensionless.
     pub nis: f64,
     /// Band of 99.9 % of the mean NIS of a right filter, dimensionless.
-    pub band: (f64, f64),
+    pub band: Span<f64>,
     /// Angle in degrees by which the filter's latitude or attitude is wrong.
     pub off_deg: f64,
     /// Outcome: agreement if the error was detected. Not resolvable if it was not, and need not be.
@@ -358,8 +360,19 @@ pub struct SlopeCurve {
     /// Accuracy order; null if no dwell makes it observable.
     pub accuracy_order: Option<usize>,
     /// Points of the curve: `(dwell in s, sigma)`, sigma in the unit of `unit`.
-    pub points: Vec<(f64, f64)>,
+    pub points: Vec<SlopePoint>,
 }
+
+/// Point of a slope curve; in JSON `[dwell_s, sigma]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlopePoint {
+    /// Dwell of every position, in s.
+    pub dwell_s: f64,
+    /// Standard deviation of the unknown, in the unit of its curve.
+    pub sigma: f64,
+}
+
+json_list!(SlopePoint { dwell_s: f64, sigma: f64 });
 
 /// Correlation matrix of the estimates.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

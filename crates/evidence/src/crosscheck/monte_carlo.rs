@@ -6,6 +6,7 @@
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::settings::{FilterKind, Truth};
+use obsdeg_core::span::Span;
 use obsdeg_ekf::consistency::{Nees, chi_square_band};
 use obsdeg_ekf::linear::{covariance_pass, state_pass};
 use obsdeg_ekf::{Covariance, CovarianceForm, Gains, Manifold, Update};
@@ -435,14 +436,14 @@ fn kind(experiment: &MonteCarloExperiment<'_>, same: bool) -> Result<FilterKind,
 }
 
 fn statistic(name: &str, dof: usize, measured: f64, count: f64) -> Statistic {
-    let wide_band = chi_square_band(dof as f64, count, 0.999);
+    let wide_band: Span<f64> = chi_square_band(dof as f64, count, 0.999).into();
     Statistic {
         name: name.into(),
         expected: dof as f64,
         measured,
-        band: chi_square_band(dof as f64, count, obsdeg_ekf::consistency::CONFIDENCE),
+        band: chi_square_band(dof as f64, count, obsdeg_ekf::consistency::CONFIDENCE).into(),
         wide_band,
-        pass: (wide_band.0..=wide_band.1).contains(&measured),
+        pass: wide_band.contains(&measured),
     }
 }
 

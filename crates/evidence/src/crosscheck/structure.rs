@@ -9,7 +9,8 @@ use obsdeg_ekf::{Covariance, CovarianceForm, SquareRootInformation};
 use obsdeg_exact::parallel;
 
 use super::answer::{
-    Agreement, Check, Correlation, Count, Counts, NullEvidence, QuantityEvidence, SlopeCurve, SpaceCheck,
+    Agreement, Check, Correlation, Count, Counts, NullEvidence, QuantityEvidence, SlopeCurve, SlopePoint,
+    SpaceCheck,
 };
 use super::asymptotics::{Asymptotics, DwellSlope, SlopeRequest, asymptotics, samples};
 use super::precise::Between;
@@ -555,7 +556,12 @@ fn curves(
                 name: name.clone(),
                 unit: shown_unit(unit).into(),
                 accuracy_order,
-                points: measured.dwells.iter().zip(sigmas).map(|(&t, s)| (t, s / scale)).collect(),
+                points: measured
+                    .dwells
+                    .iter()
+                    .zip(sigmas)
+                    .map(|(&dwell_s, s)| SlopePoint { dwell_s, sigma: s / scale })
+                    .collect(),
             }
         })
         .collect()

@@ -1,5 +1,7 @@
 //! Outcomes of all checks, in words.
 
+use obsdeg_core::span::Span;
+
 use super::answer::{Agreement, Check, CrossCheck};
 use super::{rules, structure};
 
@@ -17,8 +19,8 @@ pub(super) fn outcomes(c: &CrossCheck) -> impl Iterator<Item = Agreement> {
 pub(super) fn misfits(c: &CrossCheck) -> Vec<String> {
     let mut out = Vec::new();
     for s in c.monte_carlo.statistics.iter().filter(|s| !s.pass) {
-        let (low, high) = s.wide_band;
-        out.push(format!("{} is {:.4}, outside {low:.3}..{high:.3}", s.name, s.measured));
+        let Span { from, to } = s.wide_band;
+        out.push(format!("{} is {:.4}, outside {from:.3}..{to:.3}", s.name, s.measured));
     }
     if c.monte_carlo.unsettled > 0 {
         out.push(format!("{} of {} runs did not settle", c.monte_carlo.unsettled, c.monte_carlo.runs));

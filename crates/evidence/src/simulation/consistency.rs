@@ -1,6 +1,7 @@
 //! Consistency of a run: innovations and errors compared with the covariances of the filter.
 
 use nalgebra::{DMatrix, DVector};
+use obsdeg_core::span::Span;
 use obsdeg_ekf::consistency::{CONFIDENCE, Nees, autocorrelation, chi_square_band, ljung_box};
 use obsdeg_ekf::{Covariance, EkfError};
 use schemars::JsonSchema;
@@ -35,9 +36,9 @@ pub struct Consistency {
     /// Mean normalised innovation squared (NIS), dimensionless; its expectation is the number of outputs.
     pub nis: f64,
     /// Band of 95 % of the mean NIS, dimensionless.
-    pub nis_band: (f64, f64),
+    pub nis_band: Span<f64>,
     /// Acceptance band of 99.9 % of the mean NIS, dimensionless.
-    pub nis_wide_band: (f64, f64),
+    pub nis_wide_band: Span<f64>,
     /// Normalised estimation error squared (NEES) at the end, dimensionless. Its expectation is the number of
     /// states (unknowns, and gyro biases that are states) without the directions left out.
     pub nees: f64,
@@ -48,7 +49,7 @@ pub struct Consistency {
     /// estimated there. 0 for a platform.
     pub held_directions: usize,
     /// Band of 95 % of the NEES, dimensionless.
-    pub nees_band: (f64, f64),
+    pub nees_band: Span<f64>,
     /// Upper end of the acceptance band of 99.9 % of the NEES, dimensionless. A small NEES is no evidence:
     /// true values are given, not drawn.
     pub nees_limit: f64,
@@ -108,14 +109,14 @@ impl Consistency {
             })
             // NaN stays NaN
             .fold(1.0, |least: f64, p| if p.is_nan() { p } else { least.min(p) });
-        let nis_wide_band = chi_square_band(outputs, count, STRICT);
+        let nis_wide_band: Span<f64> = chi_square_band(outputs, count, STRICT).into();
         let (_, nees_limit) = chi_square_band(n as f64, 1.0, STRICT);
         let beyond = run.normalised.iter().filter(|(_, x)| x.abs() > CREDIBLE);
         let beyond: Vec<String> = beyond.map(|(name, _)| name.to_string()).collect();
         let numbers = run.normalised.iter().map(|(_, x)| *x).chain([nis, nees, whiteness]);
         let found = [
             (Doubt::NoNumber, !numbers.into_iter().all(f64::is_finite)),
-            (Doubt::Nis, !(nis_wide_band.0..=nis_wide_band.1).contains(&nis)),
+            (Doubt::Nis, !nis_wide_band.contains(&nis)),
             (Doubt::Nees, nees > nees_limit),
             (Doubt::Error, !beyond.is_empty()),
             // smallest probability over the outputs
@@ -124,12 +125,12 @@ impl Consistency {
         let doubts: Vec<Doubt> = found.into_iter().filter(|(_, there)| *there).map(|(d, _)| d).collect();
         Ok(Self {
             nis,
-            nis_band: chi_square_band(outputs, count, CONFIDENCE),
+            nis_band: chi_square_band(outputs, count, CONFIDENCE).into(),
             nis_wide_band,
             nees,
             unresolved_directions: free - n,
             held_directions: states - free,
-            nees_band: chi_square_band(n as f64, 1.0, CONFIDENCE),
+            nees_band: chi_square_band(n as f64, 1.0, CONFIDENCE).into(),
             nees_limit,
             whiteness_probability: whiteness,
             beyond,

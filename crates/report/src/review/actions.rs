@@ -3,6 +3,7 @@
 use obsdeg_calibration::Calibration;
 use obsdeg_calibration::answer::{CalibrationFinding, CellKind, ClockRate, Estimated, PositionFit};
 use obsdeg_core::degree::Status;
+use obsdeg_core::span::Span;
 use obsdeg_core::system::{NumberOfSolutions, SystemQuantity};
 use obsdeg_design::review::{ModelReview, SchemeReview};
 use obsdeg_evidence::compare::ComparedScheme;
@@ -212,7 +213,7 @@ pub(super) fn of_model(m: &ModelReview, by_prior: &[&str]) -> Vec<String> {
     match &m.run {
         None => out
             .push("State numbers for a run in the model file: without them no accuracy is predicted.".into()),
-        Some((run, _)) if !run.consistency.consistent => out.push(INCONSISTENT.into()),
+        Some(r) if !r.run.consistency.consistent => out.push(INCONSISTENT.into()),
         Some(_) => {}
     }
     // what is not observable has an action above
@@ -413,7 +414,7 @@ fn of_finding(c: &Calibration, f: &CalibrationFinding) -> String {
 }
 
 /// Action for cells of a column that hold one value again and again.
-fn of_cells(column: &str, kind: CellKind, (first, last): (u64, u64)) -> String {
+fn of_cells(column: &str, kind: CellKind, Span { from: first, to: last }: Span<u64>) -> String {
     match kind {
         CellKind::Code => format!(
             "Look at column {column} of the record: state its codes of missing values in the scheme file."

@@ -87,8 +87,12 @@ pub(crate) fn pictures(c: &Calibration, id: &str) -> Pictures {
 /// Answers to the questions of a board.
 pub(crate) fn answers(name: &str, c: &Calibration) -> Answers {
     let of = |r: &RecordReport| {
-        let (from, to) = r.span_s;
-        format!("{}: {}, {} samples", file_name(&r.name), super::sections::duration(to - from), r.samples)
+        format!(
+            "{}: {}, {} samples",
+            file_name(&r.name),
+            super::sections::duration(r.span_s.length()),
+            r.samples
+        )
     };
     Answers {
         name: name.into(),
@@ -194,16 +198,16 @@ fn verified(c: &Calibration) -> TableCell {
         format!(
             "chi-square {} per degree of freedom, expected {} to {}",
             number(f.factor * f.factor),
-            number(f.band.0),
-            number(f.band.1)
+            number(f.band.from),
+            number(f.band.to)
         ),
     ];
     out.extend(c.repeatability.as_ref().map(|r| {
         format!(
             "records agree with chi-square {}, expected {} to {}",
             number(r.chi_square),
-            number(r.band.0),
-            number(r.band.1)
+            number(r.band.from),
+            number(r.band.to)
         )
     }));
     TableCell::graded(out.join("; "), if c.consistent { Grade::Good } else { Grade::Missed })
@@ -252,16 +256,12 @@ pub(crate) fn status(c: &Calibration, title: String) -> StatusBox {
                 ),
                 row(
                     "Chi-square",
-                    if (f.band.0..=f.band.1).contains(&(f.factor * f.factor)) {
-                        Grade::Good
-                    } else {
-                        Grade::Limited
-                    },
+                    if f.band.contains(&(f.factor * f.factor)) { Grade::Good } else { Grade::Limited },
                     format!(
                         "{:.3} per degree of freedom ({:.3} to {:.3})",
                         f.factor * f.factor,
-                        f.band.0,
-                        f.band.1
+                        f.band.from,
+                        f.band.to
                     ),
                 ),
             ])

@@ -2,7 +2,7 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::{NumberOfSolutions, SystemAnalysis, SystemQuantity};
-use obsdeg_design::review::{ModelReview, WithoutOutput};
+use obsdeg_design::review::{ModelReview, ModelRun, WithoutOutput};
 use obsdeg_evidence::simulation::Outcome;
 use obsdeg_evidence::system::{SystemEstimate, SystemEvidence};
 
@@ -86,7 +86,7 @@ fn evidence(m: &ModelReview) -> (Grade, String) {
 
 /// Answer to the question whether the run of the filter is credible.
 fn credible(m: &ModelReview) -> (Grade, String) {
-    match m.run.as_ref().map(|r| &r.0.consistency) {
+    match m.run.as_ref().map(|r| &r.run.consistency) {
         None => (Grade::Open, "not run".into()),
         Some(c) if c.consistent => (Grade::Good, "consistent with its truth".into()),
         Some(c) => (Grade::Limited, format!("NOT consistent with its truth: {}", words::run::doubts(c))),
@@ -96,7 +96,7 @@ fn credible(m: &ModelReview) -> (Grade, String) {
 /// Unknowns whose estimate in the run equals the prior.
 fn by_prior(m: &ModelReview) -> Vec<&str> {
     let rests = |o: Outcome| matches!(o, Outcome::PriorOnly | Outcome::RestsOnPrior);
-    let estimates = m.run.iter().flat_map(|(run, _)| &run.quantities);
+    let estimates = m.run.iter().flat_map(|r| &r.run.quantities);
     // an unknown without a status is a known start, which rests on nothing else
     let never = |e: &SystemEstimate| matches!(e.status, Some(Status::Inseparable | Status::NotExcited));
     let unknown = estimates.filter(|e| e.status.is_some() && (never(e) || rests(e.outcome)));
@@ -156,7 +156,7 @@ pub(super) fn answers(m: &ModelReview) -> Answers {
             Some(reason) => format!("No run: {reason}"),
             None => "No run".into(),
         },
-        |(run, _)| {
+        |ModelRun { run, .. }| {
             format!(
                 "A run of {} with a sample every {}, in the unit of t",
                 number(run.duration),
@@ -193,7 +193,7 @@ fn assumed(m: &ModelReview) -> String {
         false => format!("at the start {}", a.constraints.join(", ")),
     }];
     out.extend((!a.known.is_empty()).then(|| format!("known starts {}", a.known.join(", "))));
-    if let Some((run, _)) = &m.run {
+    if let Some(ModelRun { run, .. }) = &m.run {
         let noise: Vec<String> = run.noise.iter().map(|(name, sigma)| format!("{name} {sigma}")).collect();
         out.push(format!("the run: noise of a sample {}; true values of the file", noise.join(", ")));
     }
@@ -205,7 +205,7 @@ fn chosen(m: &ModelReview) -> String {
     let a = &m.analysis;
     let mut out = Vec::new();
     out.extend(a.rests_on_bound.then(|| format!("orders of derivatives up to {}", a.bound)));
-    out.extend(m.run.as_ref().and_then(|(run, _)| system::priors_chosen(run)));
+    out.extend(m.run.as_ref().and_then(|r| system::priors_chosen(&r.run)));
     match (out.is_empty(), &m.run) {
         (true, Some(_)) => "Nothing: the file states every condition".into(),
         (true, None) => "Nothing for the verdicts; there is no run".into(),
@@ -301,7 +301,7 @@ pub(super) fn part(blocks: &mut Vec<DocumentBlock>, m: &ModelReview, level: usiz
         blocks.extend(document.lead.into_iter().map(DocumentBlock::Text));
         blocks.extend(document.blocks);
     }
-    if let Some((run, traces)) = &m.run {
+    if let Some(ModelRun { run, traces }) = &m.run {
         let document = run.document();
         blocks.extend(document.blocks.into_iter().filter(|b| !is_list(b, "Assumed")));
         let flat: Vec<&str> = (run.quantities.iter())

@@ -1,5 +1,6 @@
 //! Run of a filter in sentences: estimates, consistency, noise of the sensors, and limits of sigma.
 
+use obsdeg_core::span::Span;
 use obsdeg_evidence::simulation::{
     AccelerometerBias, CoefficientFloor, Consistency, Doubt, GyroNoise, NoiseFloor, Outcome, Reached,
     SimulationError,
@@ -60,8 +61,8 @@ pub(crate) fn doubts(c: &Consistency) -> String {
 }
 
 /// Band such as `1.7..2.3`.
-pub(crate) fn band((low, high): (f64, f64)) -> String {
-    format!("{}..{}", number(low), number(high))
+pub(crate) fn band(band: Span<f64>) -> String {
+    format!("{}..{}", number(band.from), number(band.to))
 }
 
 /// `; without ...`: the directions that the NEES leaves out; empty if there are none.

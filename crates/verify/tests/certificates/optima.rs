@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use obsdeg_core::degree::judge;
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::{Carry, Platform, Scheme};
+use obsdeg_design::DegreeCap;
 use obsdeg_design::design::{
     Candidates, CriterionName, DesignError, DesignOptions, OptimumCertificate, certify_optimum, design,
 };
@@ -70,7 +71,10 @@ fn draw(rng: &mut SplitMix64, i: usize) -> Task {
     }
     let options = DesignOptions {
         positions: Some(1 + rng.below(4) as usize),
-        degree_caps: if rng.below(4) == 0 { vec![(None, 1 + rng.below(2) as usize)] } else { Vec::new() },
+        degree_caps: match rng.below(4) {
+            0 => vec![DegreeCap { name: None, cap: 1 + rng.below(2) as usize }],
+            _ => Vec::new(),
+        },
         criterion,
         keep: 3,
         candidates: {
@@ -114,7 +118,7 @@ fn best_by_simulation(task: &Task, required: &[String]) -> Option<(usize, f64)> 
         let columns: Vec<usize> = required.iter().map(column).collect();
         let degrees = judge(&platform, 3).expect("verdicts").degrees.degree;
         let degrees: Option<Vec<usize>> = columns.iter().map(|&c| degrees[c]).collect();
-        let cap = options.degree_caps.first().map_or(usize::MAX, |c| c.1);
+        let cap = options.degree_caps.first().map_or(usize::MAX, |c| c.cap);
         let Some(degree) = degrees.and_then(|d| d.into_iter().max()).filter(|d| *d <= cap) else { continue };
         if best.is_some_and(|b| b.0 < degree) {
             continue;

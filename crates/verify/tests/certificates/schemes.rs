@@ -1,7 +1,7 @@
 //! Certificates of random schemes, and changed ones, compared by both checkers: this crate and
 //! `tools/verify_certificate.py`.
 
-use obsdeg_core::certificate::{Certificate, Kind, certify};
+use obsdeg_core::certificate::{Certificate, Kind, RowName, certify};
 use obsdeg_core::degree::{Status, Verdict, judge};
 use obsdeg_core::model::{Platform, Scheme, scheme_file};
 use obsdeg_exact::SplitMix64;
@@ -355,10 +355,11 @@ fn the_solution_of_the_paper() {
     assert_eq!((certificate.kind, &certificate.ranks[..]), (Kind::Exact, &[2, 6, 8][..]));
     let of = |name: &str| &certificate.verdicts.iter().find(|v| v.unknown == name).expect("an unknown").proof;
     let d_fx = of("D_FX");
-    let terms = |rows: &Option<Vec<(usize, usize, usize)>>, numbers: &Option<Vec<Vec<[i64; 5]>>>| {
+    let terms = |rows: &Option<Vec<RowName>>, numbers: &Option<Vec<Vec<[i64; 5]>>>| {
         rows.clone()
             .unwrap_or_default()
             .into_iter()
+            .map(|row| (row.segment, row.order, row.component))
             .zip(numbers.clone().unwrap_or_default())
             .collect::<Vec<_>>()
     };

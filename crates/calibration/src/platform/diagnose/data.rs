@@ -81,14 +81,3 @@ impl ReportedFunctional {
         self.determined && !self.left_open
     }
 }
-
-/// Maps both ends of a band.
-pub(in crate::platform) trait MapBoth {
-    fn map_both(self, f: impl Fn(f64) -> f64) -> Self;
-}
-
-impl MapBoth for (f64, f64) {
-    fn map_both(self, f: impl Fn(f64) -> f64) -> Self {
-        (f(self.0), f(self.1))
-    }
-}

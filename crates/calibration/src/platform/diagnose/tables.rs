@@ -6,11 +6,12 @@ use obsdeg_evidence::simulation::{latitude_of, shown_unit, si_per_shown};
 
 use super::super::estimate::{BOX, WEAK};
 use super::super::placed::channel_name;
-use super::super::run::MeasurementKey;
 use super::LOST;
 use super::data::{AnswerData, ReportedFunctional};
+use crate::answer::HeldUnknown;
 use crate::answer::{Assumed, ChannelFit, Moved, PositionFit, RecordReport};
-use crate::least_squares::{Linearised, StartInformation};
+use crate::least_squares::StartInformation;
+use crate::platform::estimate::LinearisedRun;
 use crate::setup::Setup;
 
 impl AnswerData<'_> {
@@ -22,13 +23,13 @@ impl AnswerData<'_> {
                 let (chi, free) = self.found.sums(|l| l.run == r && l.key.position == p);
                 let measurements =
                     self.found.all.iter().filter(|l| l.run == r && l.key.position == p).count();
-                let (start_s, end_s) = run.reading.stays.get(p).copied().unwrap_or((0.0, 0.0));
+                let stay = run.reading.stays.get(p).copied().unwrap_or_default();
                 let (moves, loses) = self.without(r, p, determined)?;
                 out.push(PositionFit {
                     record: run.reading.name.clone(),
                     position: position.name.clone(),
-                    start_s: run.reading.origin + start_s,
-                    end_s: run.reading.origin + end_s,
+                    start_s: run.reading.origin + stay.from,
+                    end_s: run.reading.origin + stay.to,
                     force_g: run.reading.lengths.get(p).copied().flatten().map(|l| l.length),
                     measurements,
                     chi_square: chi / free.max(f64::MIN_POSITIVE),
@@ -48,7 +49,7 @@ impl AnswerData<'_> {
         p: usize,
         determined: &[&ReportedFunctional],
     ) -> Result<(Option<Moved>, Vec<String>), EkfError> {
-        let (run, keys): &(Linearised, Vec<MeasurementKey>) = &self.estimate.at.runs[r];
+        let LinearisedRun { run, keys } = &self.estimate.at.runs[r];
         let keep: Vec<bool> = keys.iter().map(|k| k.position != p).collect();
         let rest = StartInformation::of(&run.without(&keep))?;
         let solution = self.problem.step_with(&self.estimate.at, WEAK, Some((r, &rest)))?;
@@ -100,7 +101,7 @@ impl AnswerData<'_> {
             samples: run.reading.samples,
             interval_s: run.reading.interval,
             gaps: run.reading.gaps(self.scheme),
-            empty_cells: run.reading.empty_cells(),
+            empty_cells: run.reading.missing.clone(),
             psi_at_s: run.reading.origin,
             unused: run.reading.unused,
             waiting: run.reading.waiting,
@@ -126,18 +127,16 @@ impl AnswerData<'_> {
         all.into_iter().filter(|(_, by_default)| *by_default).map(|(key, _)| key.into()).collect()
     }
 
-    /// Unknowns of a run with a stated prior: name, standard deviation, unit.
-    fn priors(&self) -> Vec<(String, f64, String)> {
+    /// Unknowns of a run with a stated prior.
+    fn priors(&self) -> Vec<HeldUnknown> {
         let (names, units) = (self.planned.platform.names(), self.planned.platform.units());
         let u = &self.problem.unknowns;
         let stated = (0..names.len()).filter(|&s| u.stated.contains(&u.index[0][s]));
         stated
-            .map(|s| {
-                (
-                    names[s].clone(),
-                    u.prior[u.index[0][s]] / si_per_shown(units[s]),
-                    shown_unit(units[s]).into(),
-                )
+            .map(|s| HeldUnknown {
+                name: names[s].clone(),
+                sigma: u.prior[u.index[0][s]] / si_per_shown(units[s]),
+                unit: shown_unit(units[s]).into(),
             })
             .collect()
     }
@@ -145,9 +144,10 @@ impl AnswerData<'_> {
     pub(super) fn assumed(&self, unknowns: &[ReportedFunctional]) -> Assumed {
         let c = self.conditions;
         let open = unknowns.iter().filter(|a| !a.determined);
-        let constrained = open.map(|a| {
-            let width = BOX * self.problem.unknowns.prior[a.terms[0].0] / si_per_shown(a.unit);
-            (a.name.clone(), width, shown_unit(a.unit).to_string())
+        let constrained = open.map(|a| HeldUnknown {
+            name: a.name.clone(),
+            sigma: BOX * self.problem.unknowns.prior[a.terms[0].0] / si_per_shown(a.unit),
+            unit: shown_unit(a.unit).into(),
         });
         Assumed {
             latitude_deg: latitude_of(self.scheme).map_or(0.0, |l| l.degrees()),

@@ -39,6 +39,15 @@ const SUPPORT: f64 = 1e-7;
 /// Largest angle, in degrees, between attitudes that are equal to within the rounding of their angles.
 const SAME: f64 = 0.02;
 
+/// Attitude with its weight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WeightedAttitude {
+    /// Euler angles, rounded to hundredths of a degree.
+    pub angles: Euler,
+    /// Rounded weight, dimensionless.
+    pub weight: f64,
+}
+
 /// Optimal weights over all attitudes and the lower bound that they prove.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Everywhere {
@@ -49,7 +58,7 @@ pub struct Everywhere {
     /// Attitudes, each once, with weights, heaviest first. Angles are rounded to hundredths of a
     /// degree: beta within a quarter of a turn, the others above -180 and up to 180 degrees. Weights
     /// are rounded; divide them by their sum.
-    pub support: Vec<(Euler, f64)>,
+    pub support: Vec<WeightedAttitude>,
 }
 
 impl Evaluator {
@@ -105,7 +114,8 @@ impl Evaluator {
         let problem = here.additive(problem.objective, k);
         let exact = || (weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &weights).unwrap_or_else(exact);
-        let support = support.into_iter().zip(weights).filter(|(_, w)| *w > 0.0).collect();
+        let support = support.into_iter().zip(weights).filter(|(_, w)| *w > 0.0);
+        let support = support.map(|(angles, weight)| WeightedAttitude { angles, weight }).collect();
         let attained = attained.sqrt().max(value);
         proceed().then_some(Everywhere { value, attained, support })
     }

@@ -10,7 +10,7 @@ mod scheme;
 pub(crate) mod value;
 mod weights;
 
-pub use free::Everywhere;
+pub use free::{Everywhere, WeightedAttitude};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,6 +22,15 @@ use weights::{listed, weigh};
 /// Largest number of first positions for which psi is bounded one by one, for requirements on psi.
 const MOST_PSI: usize = 48;
 
+/// Weights as they are listed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ListedWeights {
+    /// Rounded weight of every candidate, to be divided by their sum, dimensionless.
+    pub weights: Vec<f64>,
+    /// Criterion of these weights, in deg/h (per g), for margin dimensionless.
+    pub attained: f64,
+}
+
 /// Lower bound on the criterion of every scheme of given candidates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bound {
@@ -31,8 +40,8 @@ pub struct Bound {
     pub attained: f64,
     /// Weight of every candidate, dimensionless (sum 1).
     pub weights: Vec<f64>,
-    /// Weights as they are listed, rounded, to be divided by their sum; and the criterion of these.
-    pub listed: (Vec<f64>, f64),
+    /// Weights as they are listed, and their criterion.
+    pub listed: ListedWeights,
 }
 
 impl Evaluator {
@@ -130,7 +139,7 @@ impl Evaluator {
         let exact = || (found.weights.clone(), found.attained);
         let (weights, attained) = listed(&problem, &found.weights).unwrap_or_else(exact);
         // the bound of exact weights may rest on rounding
-        let listed = (weights, attained.max(found.bound).sqrt());
+        let listed = ListedWeights { weights, attained: attained.max(found.bound).sqrt() };
         Some(Bound {
             value: found.bound.sqrt(),
             attained: found.attained.sqrt(),

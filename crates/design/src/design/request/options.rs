@@ -8,6 +8,7 @@ use obsdeg_core::model::settings::concerns;
 use obsdeg_core::model::{may_be_omitted, omitted_meant};
 use serde::{Deserialize, Serialize};
 
+use crate::degree_caps::DegreeCap;
 use crate::design::request::candidates::Candidates;
 
 /// Options of a design.
@@ -19,8 +20,8 @@ pub struct DesignOptions {
     pub positions: Option<usize>,
     /// Coefficients or families that must be observable; if empty, all coefficients.
     pub required: Vec<String>,
-    /// Largest degrees: of a coefficient or family, or of all other required coefficients (`None`).
-    pub degree_caps: Vec<(Option<String>, usize)>,
+    /// Largest degrees of coefficients or families, or of all other required coefficients.
+    pub degree_caps: Vec<DegreeCap>,
     /// Errors that are not estimated and that schemes must be immune to.
     pub immune: Vec<Immune>,
     /// True if only schemes are accepted that meet the requirements of the conditions on the required

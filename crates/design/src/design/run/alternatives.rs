@@ -8,6 +8,7 @@ use obsdeg_evidence::simulation::Conditions;
 use crate::design::answer::Found;
 use crate::design::measure::stop::Stop;
 use crate::design::nearest::Nearest;
+use crate::design::nearest::TriedCandidates;
 use crate::design::request::candidates::Candidates;
 use crate::design::request::error::DesignError;
 use crate::design::request::options::{CriterionName, DesignOptions};
@@ -178,9 +179,9 @@ impl AlternativeSearch<'_> {
                 best => best?,
             };
             let name = format!("grid:{}", step / 1_000_000_000);
-            let found = best.map(|(_, found)| found);
-            let does = found.as_ref().is_some_and(|f| f.requirements.all_met());
-            self.out.candidates.push((name, found));
+            let best = best.map(|(_, found)| found);
+            let does = best.as_ref().is_some_and(|f| f.requirements.all_met());
+            self.out.candidates.push(TriedCandidates { name, best });
             if does {
                 break;
             }

@@ -1,10 +1,11 @@
 //! Reports of bounds on the schemes of a task.
 
 use nalgebra::DMatrix;
-use obsdeg_core::model::{Euler, angles_text};
+use obsdeg_core::model::angles_text;
 use obsdeg_exact::parallel;
 
 use crate::design::answer::{Certificate, EverywhereReport, Finer, Rounded, Weight};
+use crate::design::certificate::WeightedAttitude;
 use crate::design::certificate::value::{CriterionValue, excess};
 use crate::design::certificate::{Bound, Everywhere};
 use crate::design::measure::evaluator::Evaluator;
@@ -22,7 +23,7 @@ pub(crate) fn everywhere(
     value: CriterionValue,
     rounded: Option<(i64, Option<&MovedScheme>)>,
 ) -> EverywhereReport {
-    let weight = |(euler, weight): &(Euler, f64)| Weight { candidate: angles_text(euler), weight: *weight };
+    let weight = |a: &WeightedAttitude| Weight { candidate: angles_text(&a.angles), weight: a.weight };
     let (listed, lighter) = found.support.split_at(found.support.len().min(LISTED));
     EverywhereReport {
         best_possible: found.value,
@@ -31,7 +32,7 @@ pub(crate) fn everywhere(
         attained: found.attained,
         weights: listed.iter().map(weight).collect(),
         lighter: lighter.len(),
-        lighter_weight: lighter.iter().map(|(_, weight)| weight).sum(),
+        lighter_weight: lighter.iter().map(|a| a.weight).sum(),
         rounded: rounded.map(|(step, finer)| Rounded {
             step_deg: step as f64 / 1e9,
             finer: finer
@@ -70,13 +71,13 @@ impl Task<'_> {
     /// Report of the bound over the candidates, beside the criterion `value` of the best scheme found.
     pub(crate) fn certificate(&self, bound: &Bound, value: CriterionValue) -> Certificate {
         let excess = excess(value.at_most, bound.value);
-        let weights = self.candidates.names.iter().zip(&bound.listed.0).filter(|(_, w)| **w > 0.0);
+        let weights = self.candidates.names.iter().zip(&bound.listed.weights).filter(|(_, w)| **w > 0.0);
         Certificate {
             best_possible: bound.value,
             within_percent: 100.0 * excess,
             efficiency: (1.0 + excess).powi(-2),
             rounding: value.rounding,
-            attained: bound.listed.1,
+            attained: bound.listed.attained,
             weights: weights.map(|(name, &weight)| Weight { candidate: name.clone(), weight }).collect(),
             everywhere: None,
             front: Vec::new(),

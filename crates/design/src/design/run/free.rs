@@ -11,6 +11,7 @@ use obsdeg_evidence::simulation::Conditions;
 use obsdeg_exact::{SplitMix64, parallel};
 
 use crate::design::certificate::Everywhere;
+use crate::design::certificate::WeightedAttitude;
 use crate::design::measure::stop::Stop;
 use crate::design::polish::rounding::{MovedScheme, Moves, OnGrids, random, rounded};
 use crate::design::request::candidates::Candidates;
@@ -101,10 +102,10 @@ impl Free {
 
     /// Adds the heaviest attitudes of the support, rounded to multiples of `step` 1e-9 degrees.
     fn add_support(&mut self, step: i64) {
-        let mut support: Vec<&(Euler, f64)> = self.every.support.iter().collect();
-        support.sort_by(|a, b| b.1.total_cmp(&a.1));
-        for (euler, _) in support.into_iter().take(WEIGHED) {
-            self.candidates.add(euler.each_ref().map(|angle| rounded(angle, step)));
+        let mut support: Vec<&WeightedAttitude> = self.every.support.iter().collect();
+        support.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        for WeightedAttitude { angles, .. } in support.into_iter().take(WEIGHED) {
+            self.candidates.add(angles.each_ref().map(|angle| rounded(angle, step)));
         }
     }
 

@@ -39,10 +39,7 @@ pub(crate) fn sha256(text: &str) -> String {
 
 /// Options by name as a user writes them; those that are not given are left out.
 fn options_written(options: &DesignOptions) -> BTreeMap<String, String> {
-    let caps = options.degree_caps.iter().map(|(name, cap)| match name {
-        Some(name) => format!("{name}={cap}"),
-        None => cap.to_string(),
-    });
+    let caps = options.degree_caps.iter().map(ToString::to_string);
     let criterion = match options.criterion {
         CriterionName::Worst => "worst",
         CriterionName::A => "a",
@@ -170,12 +167,14 @@ fn of_options(options: &DesignOptions) -> String {
         free,
         seed,
     } = options;
+    // files of before hold the digest of these pairs
+    let degree_caps: Vec<_> = degree_caps.iter().map(|c| (&c.name, c.cap)).collect();
     let of: [(&str, &dyn Debug); 17] = [
         ("candidates", &candidates.names),
         ("angles of candidates", &candidates.attitudes),
         ("positions", positions),
         ("observable", required),
-        ("max-degree", degree_caps),
+        ("max-degree", &degree_caps),
         ("immune", immune),
         ("meet", meet),
         ("max-time", total_s),

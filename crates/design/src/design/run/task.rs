@@ -8,7 +8,7 @@ use obsdeg_core::model::{Angle, Carry, Platform, Scheme};
 use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{Conditions, PRIOR, SimulationError, resolve};
 
-use crate::degree_caps::widest_first;
+use crate::degree_caps::{DegreeCap, widest_first};
 use crate::design::answer::Minimum;
 use crate::design::measure::criterion::Criterion;
 use crate::design::measure::evaluator::Evaluator;
@@ -275,7 +275,7 @@ impl<'a> Task<'a> {
             None => format!("no effect of {}", i.name),
         }));
         let caps = widest_first(&self.options.degree_caps);
-        for (name, cap) in &caps {
+        for DegreeCap { name, cap } in &caps {
             let every = if caps.len() > 1 {
                 "every other required coefficient"
             } else {

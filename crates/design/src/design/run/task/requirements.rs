@@ -4,7 +4,7 @@ use obsdeg_core::model::settings::concerns;
 use obsdeg_core::model::{Path, Platform, Scheme, Unknowns};
 use obsdeg_evidence::simulation::{Conditions, resolve};
 
-use crate::degree_caps::widest_first;
+use crate::degree_caps::{DegreeCap, widest_first};
 use crate::design::measure::criterion::{Criterion, SigmaLimits};
 use crate::design::observable::rows::AttitudeRows;
 use crate::design::observable::symmetry::CandidateSymmetry;
@@ -77,7 +77,7 @@ pub(super) fn caps(
     options: &DesignOptions,
 ) -> Result<Vec<usize>, DesignError> {
     let mut caps = vec![usize::MAX; required.len()];
-    for (name, cap) in widest_first(&options.degree_caps) {
+    for DegreeCap { name, cap } in widest_first(&options.degree_caps) {
         let concerned = name.as_ref().map(|name| named(all, name)).transpose()?;
         for (slot, c) in caps.iter_mut().zip(required) {
             if concerned.as_ref().is_none_or(|list| list.contains(&c.1)) {
