@@ -1,4 +1,14 @@
-// Search for the best schemes; the text of schemes and models.
+// The search for the best schemes.
+import { gimbalLimits, limitsIn, limitsText } from './conditions.js';
+import { $, element, put, tableOf } from './dom.js';
+import { searcher } from './engine.js';
+import { fault, inPageWords, labelOf, mend, mendAll, numberIn, searchFaults } from './fields.js';
+import { matrixOf } from './geometry.js';
+import { say } from './notice.js';
+import { copy, edit, positionOf, source, state } from './scheme.js';
+import { drawSentences } from './table.js';
+import { show } from './tabs.js';
+import { drawPlatform, onDraw } from './view.js';
 
 // numbers that limit a search, by their field: option of the request, what is expected, and its test
 const LIMITS = {
@@ -21,14 +31,15 @@ const listIn = (id) => $(id).value.split(',').map((t) => t.trim()).filter(Boolea
 
 /** The request of a search; null if a field holds something wrong, which is then shown there. */
 function searched() {
-  mendAll([...faults.keys()].filter((id) => id.startsWith('design-')));
+  mendAll(searchFaults());
   const k = numberIn($('design-k'));
   if (!Number.isInteger(k) || k < 1 || k > 100) fault('design-k', `K: expected a whole number from 1 to 100, found "${$('design-k').value}"`);
   // the candidates under the conditions of the scheme
   const own = copy(state.scheme);
   if (!own.position?.length) own.position = [{ attitude: 'NUE' }];
   // more than are shown: rows of equal figures are folded
-  const request = { positions: k, keep: KEPT, conditions_file: { name: state.name, text: toToml(own) }, candidates: $('design-candidates').value, criterion: $('design-criterion').value, meet: $('design-meet').checked };
+  const request = { positions: k, keep: KEPT, conditions_file: source(own), candidates: $('design-candidates').value,
+    criterion: $('design-criterion').value, meet: $('design-meet').checked };
   for (const [id, [key, expected, holds]] of Object.entries(LIMITS)) {
     const x = numberIn($(id));
     if (x === undefined) continue;
@@ -37,7 +48,7 @@ function searched() {
   const limits = limitsIn('design-gimbals'), observable = [...new Set(listIn('design-observable'))];
   if (limits && Object.keys(limits).length) request.gimbal = limitsText(limits).split(', ');
   if (observable.length) request.observable = observable;
-  const first = [...faults.keys()].find((id) => id.startsWith('design-'));
+  const [first] = searchFaults();
   if (first) $(first).focus();
   return first ? null : request;
 }
@@ -97,14 +108,14 @@ function withLimits(s, request) {
   return s;
 }
 
-function drawFoundOf() {
+export function drawFoundOf() {
   const old = foundOf !== null && foundOf.conditions !== conditions(foundOf.request);
   for (const id of ['found', 'found-sentences', 'winner']) $(id).classList.toggle('stale', searching || old);
   put($('found-old'), old ? 'The conditions have changed since this search: its figures are of those before.' : '');
 }
 
 /** Says which limits hold where the fields of the search are empty. */
-function drawLimits() {
+export function drawLimits() {
   const { gimbals = {}, simulation = {} } = state.scheme;
   const limits = limitsText(gimbals);
   const rate = simulation.slew_rate_deg_s;
@@ -124,6 +135,9 @@ function load(f, number, request) {
   say(`Scheme ${number} of the search is loaded.`, 'fine');
 }
 
+// draws the pictures of the best scheme again
+let drawPictures = () => {};
+
 /** Draws the positions of the best scheme. */
 function drawWinner(f) {
   const pictures = f.angles.map((text, i) => {
@@ -134,12 +148,11 @@ function drawWinner(f) {
     return { angles, canvas, figure: element('figure', {}, canvas, caption) };
   });
   $('winner').replaceChildren(...pictures.map((p) => p.figure));
-  drawWinner.again = () => pictures.forEach(({ angles, canvas }) => {
+  drawPictures = () => pictures.forEach(({ angles, canvas }) => {
     if (canvas.clientWidth && angles.every(Number.isFinite)) drawPlatform(canvas, matrixOf(angles), { small: true });
   });
-  drawWinner.again();
+  drawPictures();
 }
-drawWinner.again = () => {};
 
 // schemes that are asked for, most rows of different figures, and most schemes in one row
 const KEPT = 300, ROWS = 10, EQUAL = 20;
@@ -180,123 +193,8 @@ function drawFound(design, took, request) {
   $('found').replaceChildren(tableOf(['', 'positions', `criterion${unit}`, 'worst', 'largest degree', 'requirements met', 'total time'], rows));
 }
 
-/** Position from the angles of an answer: by letters, unless gimbal limits require these angles. */
-function positionOf(text, gimbals) {
-  const angles = text.split(',').map(Number);
-  const letters = !gimbals && angles.every(Number.isFinite) ? lettersOf(matrixOf(angles)) : null;
-  return letters ? { attitude: letters } : { angles_deg: text.split(',').map((t) => (Number.isFinite(Number(t)) ? Number(t) : t.trim())) };
-}
-
-/** The line of a text with the place of a problem marked under it. */
-function placed(text, { line, start, end }) {
-  const from = text.lastIndexOf('\n', start - 1) + 1, whole = text.slice(from).split('\n', 1)[0], cut = Math.max(0, start - from - 40);
-  const shownLine = whole.slice(cut, cut + 72), marked = Math.max(1, Math.min(end, from + whole.length) - start);
-  const head = `${line} | `;
-  return `${head}${shownLine}\n${' '.repeat(head.length + start - from - cut)}${'^'.repeat(Math.min(marked, 72))}`;
-}
-
-/** Judges the text in the editor. */
-async function judgeText() {
-  const text = $('text').value;
-  const faint = (on) => ['text-verdicts', 'text-why'].forEach((id) => $(id).classList.toggle('stale', on));
-  const late = setTimeout(() => {
-    faint(true);
-    put($('text-old'), $('text-verdicts').children.length ? 'Judging: what follows is of the text before.' : 'Judging\u2026');
-  }, LATE);
-  const found = await live.ask('verdicts', [{ sources: [{ name: writing.name, text }] }], { topic: 'text' }).catch((p) => ({ problem: p })).finally(() => clearTimeout(late));
-  if (!found || text !== $('text').value) return;
-  const area = $('text'), { problem, answer, math, sentences } = found;
-  area.setAttribute('aria-invalid', problem ? 'true' : 'false');
-  $('text-problem').replaceChildren();
-  // the last answer stays while the text is wrong
-  faint(!!problem);
-  put($('text-old'), problem && $('text-verdicts').children.length ? 'The text is wrong: what follows is of the text before.' : '');
-  if (problem) {
-    const { place, message } = problem;
-    $('text-problem').append(place ? `Line ${place.line}, column ${place.column}: ${message} ` : message);
-    if (place) {
-      const mark = element('pre', { textContent: placed(text, place) });
-      mark.setAttribute('aria-hidden', 'true');
-      $('text-problem').append(mark);
-      const go = element('button', { type: 'button', textContent: 'Show the place' });
-      go.addEventListener('click', () => {
-        area.focus();
-        area.setSelectionRange(place.start, Math.max(place.end, place.start + 1));
-        area.scrollTop = Math.max(0, (place.line - 4)) * parseFloat(getComputedStyle(area).lineHeight);
-      });
-      $('text-problem').append(go);
-    }
-    return;
-  }
-  $('text-why').hidden = true;
-  $('text-why').replaceChildren();
-  const named = (q) => {
-    const e = element('button', { type: 'button', className: 'why', title: 'Why this verdict, and what changes it' });
-    putName(e, math[q.name ?? q.expression], q.name ?? q.expression);
-    e.addEventListener('click', () => explain($('text-why'), { name: writing.name, text }, q.name ?? q.expression));
-    return e;
-  };
-  const solved = (s) => {
-    const text = s === null || s === undefined ? '' : s.text ?? s;
-    const e = element('span');
-    putSolution(e, math[text], text, s?.terms?.length ?? 0);
-    return e;
-  };
-  const rows = answer.quantities.map((q) => [named(q), q.unit, WORDS[q.status] ?? q.status.replaceAll('_', ' '), String(q.degree ?? '\u2013'),
-    q.degree === null ? (q.partners?.length ? `not told from ${q.partners.join(', ')}` : '') : solved(q.solution)]);
-  const parts = [tableOf(['unknown', 'unit', 'status', 'degree', 'solution, or why none'], rows, `rank ${answer.rank} of ${answer.unknowns.length ?? answer.unknowns}`)];
-  const lines = element('div');
-  drawSentences(lines, sentences);
-  parts.unshift(lines);
-  if (answer.quantities.some((q) => q.degree !== null && !q.solution)) {
-    parts.push(element('p', { className: 'soft', textContent: 'Solutions that are not here need the symbolic engine, which the command line has.' }));
-  }
-  const list = (title, items) => items?.length && parts.push(element('h3', { textContent: title }), element('ul', {}, ...items.map((t) => element('li', { textContent: t }))));
-  list('Symmetries: these changes move no output', answer.symmetries?.map((s) => s.words));
-  list('No other polynomial change is known', answer.other_directions?.map((names) => `${names.join(', ')} move together`));
-  const none = answer.rests_on_bound ? `not seen up to order ${answer.last_order}` : 'not observable';
-  const judged = (c) => `${c.expression}: ${c.degree === null ? none : `observable, degree ${c.degree}`}`;
-  list('Identifiable combinations', answer.invariants?.map(judged));
-  list('Combinations', answer.combinations?.map(judged));
-  $('text-verdicts').replaceChildren(...parts);
-}
-
-const writing = { name: 'scheme.toml', timer: null, own: false };
-
-function setText(text, name) {
-  $('text').value = text;
-  writing.name = name;
-  judgeText();
-}
-
-/** Takes the text over as positions. */
-async function take() {
-  const name = writing.name;
-  if (!(await openText($('text').value, name)) && $('text').getAttribute('aria-invalid') !== 'true') wrong({ message: `${name} is a model; expected a scheme, with [[position]] tables` });
-}
-
-/** Opens a text: a scheme as positions, anything else in the editor. */
-async function openText(text, name) {
-  const [read, judged] = await Promise.all([live.ask('toml', [text]), live.ask('call', ['analyze', { sources: [{ name, text }], solutions: false, omitted: false }])])
-    .catch((p) => [{ problem: p }, {}]);
-  const value = read.value, scheme = value && Array.isArray(value.position) && !value.states;
-  if (scheme && !judged.problem) {
-    quitTour();
-    replace(value, name);
-    writing.own = false;
-    show('scheme');
-    say(`${name} is open.`, 'fine');
-    return true;
-  }
-  writing.own = true;
-  setText(text, name);
-  show('text');
-  const problem = judged.problem ?? read.problem;
-  if (problem) say(problem.message.startsWith(name) ? problem.message : `${name}: ${problem.message}`);
-  return false;
-}
-
-function wireDesign() {
+export function wireDesign() {
+  onDraw(() => drawPictures());
   $('design-go').addEventListener('click', search);
   $('panel-design').addEventListener('keydown', (e) => {
     if (e.key === 'Enter' && e.target.matches('input')) { e.preventDefault(); if (!searching) search(); }
@@ -304,24 +202,4 @@ function wireDesign() {
   // what is changed there is examined by the next search
   $('panel-design').addEventListener('change', (e) => mend(e.target.id));
   $('design-stop').addEventListener('click', () => searcher.stop());
-  DATA.examples.forEach((e, i) => $('gallery').append(element('option', { value: i, textContent: e.kind === 'model' ? `${e.name} (model)` : e.name })));
-  $('gallery').addEventListener('change', () => {
-    const e = DATA.examples[$('gallery').value];
-    if (!e) return;
-    writing.own = true;
-    put($('about'), `${e.name}: ${e.about}`);
-    setText(e.text, `${e.name}.toml`);
-  });
-  $('text').addEventListener('input', () => {
-    writing.own = true;
-    clearTimeout(writing.timer);
-    writing.timer = setTimeout(judgeText, 250);
-  });
-  $('take').addEventListener('click', take);
-  $('renew').addEventListener('click', () => {
-    writing.own = false;
-    put($('about'), '');
-    setText(toToml(state.scheme), state.name);
-  });
-  listeners.push(drawFoundOf, drawLimits);
 }

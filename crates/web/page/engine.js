@@ -1,7 +1,7 @@
 // Workers that run the engine. A worker answers one question at a time. Only the latest question of a topic
 // waits.
 
-const DATA = JSON.parse(document.getElementById('data').textContent);
+export const DATA = JSON.parse(document.getElementById('data').textContent);
 const SOURCE = URL.createObjectURL(new Blob([DATA.worker], { type: 'text/javascript' }));
 // engine compiled by the first worker that is ready, for all others
 let compiled = null;
@@ -82,9 +82,9 @@ function makeEngine() {
 }
 
 // workers for questions after every input, for slow questions, and for searches
-const live = makeEngine(), behind = makeEngine(), searcher = makeEngine();
+export const live = makeEngine();
+export const behind = makeEngine();
+export const searcher = makeEngine();
 
-/** Answers a command of the command line; `request` holds its options and files. */
-async function call(command, request) {
-  return live.ask('call', [command, request]);
-}
+/** Time in ms after which an answer that is not there yet makes the one before faint. */
+export const LATE = 400;

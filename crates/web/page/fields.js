@@ -1,9 +1,11 @@
-// Errors at their fields: a field keeps a refused text, with the reason below it.
+// Fields and their errors: a field keeps a refused text, with the reason below it.
+import { $, element, finite, put } from './dom.js';
+import { AXES } from './geometry.js';
 
 // fields with an error, and its kind: `own` for a text that the page refuses, `engine` for a value of the scheme
 const faults = new Map();
 // fields of the selected position
-const OF_POSITION = ['alpha-number', 'beta-number', 'gamma-number', 'letters', 'name', 'own-dwell'];
+export const OF_POSITION = ['alpha-number', 'beta-number', 'gamma-number', 'letters', 'name', 'own-dwell'];
 // fields by the key of a scheme file; a table stands for all its keys
 const FIELDS = {
   carry: 'carry', terms: 'terms', latitude_deg: 'latitude-number', requirements: 'requirements', bench: 'bench', gimbals: 'gimbals',
@@ -14,14 +16,14 @@ const FIELDS = {
 const SAID = [[/positions are named/, 'name'], [/gimbals do not reach/, 'gimbals'], [/^slews of finite/, 'slew-rate']];
 
 /** A text of the engine with the names of fields in place of keys. */
-function inPageWords(text) {
+export function inPageWords(text) {
   const dotted = Object.entries(FIELDS).filter(([key]) => key.includes('.')).reduce((words, [key, id]) => words.replaceAll(key, labelOf(id)), text);
   const tables = ['requirements', 'bench', 'gimbals'].reduce((words, id) => words.replace(new RegExp(`\\b${id}\\.(?=[A-Za-z])`, 'g'), `${labelOf(id)}: `), dotted);
   return tables.replace(/\bslew_rate_deg_s\b/, labelOf('slew-rate'));
 }
 
 /** Shows an error under a field. */
-function fault(id, message, kind = 'own') {
+export function fault(id, message, kind = 'own') {
   const field = $(id), line = $(`${id}-wrong`) ?? element('p', { id: `${id}-wrong`, className: 'wrong' });
   line.setAttribute('role', 'alert');
   put(line, message);
@@ -33,10 +35,15 @@ function fault(id, message, kind = 'own') {
 }
 
 /** Name of a field on the page. */
-const labelOf = (id) => $(id).getAttribute('aria-label')?.split(' in ')[0] ?? [...$(id).labels[0].childNodes].find((n) => n.nodeType === Node.TEXT_NODE).textContent.trim();
+export const labelOf = (id) => $(id).getAttribute('aria-label')?.split(' in ')[0] ?? [...$(id).labels[0].childNodes].find((n) => n.nodeType === Node.TEXT_NODE).textContent.trim();
+
+/** Kind of the error of a field: `own` or `engine`; undefined if it has none. */
+export const faultOf = (id) => faults.get(id);
+/** Fields of a search that have an error. */
+export const searchFaults = () => [...faults.keys()].filter((id) => id.startsWith('design-'));
 
 /** Removes the error of a field. */
-function mend(id) {
+export function mend(id) {
   if (!faults.delete(id)) return;
   const field = $(id), { hint } = field.dataset;
   $(`${id}-wrong`)?.remove();
@@ -45,17 +52,17 @@ function mend(id) {
 }
 
 /** Removes the errors of some fields, of all fields of the scheme, or of a kind. */
-const mendAll = (ids) => ids.forEach(mend);
-const mendScheme = () => mendAll([...faults.keys()].filter((id) => !id.startsWith('design-')));
-const mendKind = (kind) => mendAll([...faults].filter(([, k]) => k === kind).map(([id]) => id));
+export const mendAll = (ids) => ids.forEach(mend);
+export const mendScheme = () => mendAll([...faults.keys()].filter((id) => !id.startsWith('design-')));
+export const mendKind = (kind) => mendAll([...faults].filter(([, k]) => k === kind).map(([id]) => id));
 
 /** Sets the value of a field, unless it has the focus or a text that was refused. */
-function fill(id, value) {
+export function fill(id, value) {
   if (document.activeElement !== $(id) && faults.get(id) !== 'own') $(id).value = value ?? '';
 }
 
 /** Key of a scheme file at an offset of its text, the index of its position, and the index in a list. */
-function keyAt(text, offset) {
+export function keyAt(text, offset) {
   const lines = text.slice(0, text.indexOf('\n', offset) + 1 || undefined).trimEnd().split('\n');
   let table = '', position = -1, key = '';
   for (const line of lines) {
@@ -68,29 +75,10 @@ function keyAt(text, offset) {
 }
 
 /** Field that an error of the engine is about; null if it has no field here. */
-function fieldOf(problem, { keys, index }) {
+export function fieldOf(problem, { keys, index }) {
   const said = SAID.find(([of]) => of.test(problem.message))?.[1];
   return said ?? (keys[0] === 'position.angles_deg' ? `${AXES[index] ?? AXES[0]}-number` : keys.map((key) => FIELDS[key]).find(Boolean)) ?? null;
 }
 
-// the last refusal of the scheme by the engine, and the text that it is of; null for a scheme that was judged
-let refused = null;
-
-/** Shows an error of the engine at the field of its value, or above all if it has no field here. */
-function wrongAt(problem, text) {
-  refused = { problem, text };
-  const { place } = problem, at = place ? keyAt(text, place.start) : { position: null, keys: [], index: 0 };
-  const id = fieldOf(problem, at), here = !OF_POSITION.includes(id) || at.position === null || at.position === state.selected;
-  if (!id || !here) {
-    const where = at.position === null ? '' : `${nameOfPosition(state.scheme.position[at.position], at.position)}: `;
-    return wrong({ message: `${where}${problem.message}` }, true);
-  }
-  if ($('notice').dataset.engine) clearNotice();
-  // what is typed there and was refused before comes first
-  if (faults.get(id) !== 'own') fault(id, inPageWords(problem.message), 'engine');
-}
-
-/** Shows the last refusal again, for the position that is selected now. */
-function wrongAgain() {
-  if (refused) wrongAt(refused.problem, refused.text);
-}
+/** Number in a field; undefined if the field is empty, NaN if it holds no number. */
+export const numberIn = (e) => (e.value.trim() === '' ? undefined : finite(e.value));

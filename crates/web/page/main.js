@@ -1,17 +1,21 @@
-// Tabs, files, links, keys; start of the page.
-
-const TABS = ['scheme', 'design', 'text'];
-
-function show(tab) {
-  for (const t of TABS) {
-    const on = t === tab;
-    $(`tab-${t}`).setAttribute('aria-selected', on);
-    $(`tab-${t}`).tabIndex = on ? 0 : -1;
-    $(`panel-${t}`).hidden = !on;
-  }
-  if (tab === 'text' && !writing.own) setText(toToml(state.scheme), state.name);
-  if (tab === 'scheme') { canvasSoon(); drawVerdicts(); }
-}
+// Files, links, keys; start of the page, and what follows an edit.
+import { askRest, askVerdicts } from './ask.js';
+import { drawConditions, wireConditions } from './conditions.js';
+import { drawFoundOf, drawLimits, wireDesign } from './design.js';
+import { $, element } from './dom.js';
+import { behind, live } from './engine.js';
+import { mendScheme } from './fields.js';
+import { clearFine, say, wrong, wrongAgain } from './notice.js';
+import { drawPositions, drawSelected, makeSliders, wirePositions } from './positions.js';
+import { changed, on, packed, redo, source, state, toToml, undo, unpacked } from './scheme.js';
+import { askBehind, wireStrip } from './sweep.js';
+import { drawVerdicts } from './table.js';
+import { onShow, show, wireTabs } from './tabs.js';
+import { openText, renewText, setText, wireText, writing } from './text.js';
+import { leaveTour, wireTour } from './tour.js';
+import { emphasise } from './verdicts.js';
+import { canvasSoon, clearColors, wireView } from './view.js';
+import { fadeWhy, wireWhy } from './why.js';
 
 /** Downloads a text as a file. */
 function download(text, name, type) {
@@ -95,38 +99,39 @@ function wireFiles() {
   });
 }
 
-function wireTabs() {
-  for (const t of TABS) $(`tab-${t}`).addEventListener('click', () => show(t));
-  $('tabs').addEventListener('keydown', (e) => {
-    const at = TABS.findIndex((t) => $(`tab-${t}`).getAttribute('aria-selected') === 'true'), last = TABS.length - 1;
-    const to = { ArrowLeft: at - 1, ArrowRight: at + 1, Home: 0, End: last }[e.key];
-    if (to === undefined) return;
-    e.preventDefault();
-    const next = TABS[(to + TABS.length) % TABS.length];
-    show(next);
-    $(`tab-${next}`).focus();
-  });
+/** What follows the events of the scheme, in this order. */
+function wireScheme() {
+  on('gesture', emphasise);
+  on('edit', clearFine);
+  on('replaced', mendScheme, leaveTour);
+  on('changed', drawFoundOf, drawLimits, fadeWhy, askVerdicts, drawPositions, drawSelected, drawConditions, askRest);
+  on('selected', drawPositions, drawSelected, wrongAgain, askBehind);
 }
 
 async function begin() {
   $('undo').addEventListener('click', undo);
   $('redo').addEventListener('click', redo);
   makeSliders();
+  wirePositions();
   wireConditions();
   wireView();
   wireStrip();
   wireDesign();
+  wireText();
   wireWhy();
   wireTour();
   wireFiles();
   wireTabs();
-  listeners.push(askVerdicts, drawPositions, drawSelected, drawConditions, askRest);
+  wireScheme();
+  onShow('scheme', canvasSoon, drawVerdicts);
+  onShow('text', renewText);
   new ResizeObserver(canvasSoon).observe($('panel-scheme'));
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { palette.clear(); canvasSoon(); });
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { clearColors(); canvasSoon(); });
   if (!(await openLink())) changed();
   document.documentElement.dataset.ready = 'yes';
 }
 
-// commands for the browser's console
+// for the browser's console; a request holds options and files of a command of the command line
+const call = (command, request) => live.ask('call', [command, request]);
 window.obsdeg = { call, scheme: () => toToml(state.scheme), ask: live.ask };
 begin();

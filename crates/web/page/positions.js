@@ -1,17 +1,12 @@
-// The list of positions, the sliders of the selected position, and the conditions.
-
-const $ = (id) => document.getElementById(id);
-const AXES = ['alpha', 'beta', 'gamma'];
-
-function element(tag, properties = {}, ...children) {
-  const e = Object.assign(document.createElement(tag), properties);
-  e.append(...children);
-  return e;
-}
-
-// rounded to 1e-9 deg, the resolution of angles
-const shown = (x) => decimal(Math.round(x * 1e9) / 1e9).replace('-', '\u2212');
-const chosen = () => state.scheme.position?.[state.selected];
+// The list of positions, and the sliders and fields of the selected one.
+import { $, element, finite } from './dom.js';
+import { OF_POSITION, fault, faultOf, fill, labelOf, mend, mendAll, numberIn } from './fields.js';
+import { AXES, lettersOf, matrixOf, matrixOfLetters, withinTurn } from './geometry.js';
+import { say } from './notice.js';
+import {
+  anglesOfPosition, canRedo, canUndo, chosen, copy, edit, endGesture, nameOfPosition, select, shown, state,
+} from './scheme.js';
+import { canvasSoon } from './view.js';
 
 function describe(p) {
   const angles = p.attitude ?? (p.angles_deg ?? []).map((a) => (typeof a === 'number' ? shown(a) : a)).join(', ');
@@ -19,15 +14,7 @@ function describe(p) {
   return `${angles}${turns}`;
 }
 
-function select(i, focus = false) {
-  state.selected = i;
-  gesture = null;
-  drawPositions();
-  drawSelected();
-  wrongAgain();
-  askBehind();
-  if (focus) $('positions').children[i]?.querySelector('.name').focus();
-}
+const focusOn = (i) => $('positions').children[i]?.querySelector('.name').focus();
 
 function move(from, to, focus = false) {
   const count = state.scheme.position.length;
@@ -37,10 +24,10 @@ function move(from, to, focus = false) {
     state.selected = to;
   });
   say(`${nameOfPosition(chosen(), to)} is now position ${to + 1} of ${count}`, 'unseen');
-  if (focus) $('positions').children[to]?.querySelector('.name').focus();
+  if (focus) focusOn(to);
 }
 
-function drawPositions() {
+export function drawPositions() {
   const list = $('positions'), all = state.scheme.position ?? [];
   while (list.children.length > all.length) list.lastChild.remove();
   while (list.children.length < all.length) list.append(row());
@@ -55,8 +42,8 @@ function drawPositions() {
     button.setAttribute('aria-current', i === state.selected ? 'true' : 'false');
   });
   for (const id of ['duplicate', 'delete', 'slew']) $(id).disabled = !all.length;
-  $('undo').disabled = !past.length;
-  $('redo').disabled = !future.length;
+  $('undo').disabled = !canUndo();
+  $('redo').disabled = !canRedo();
 }
 
 const indexOf = (e) => [...$('positions').children].indexOf(e.closest('li'));
@@ -105,7 +92,8 @@ function lift(e) {
 }
 
 /** Sets one Euler angle of the selected position. */
-function setAngle(axis, value, as) {
+export function setAngle(axis, value, as) {
+  state.axis = axis;
   mendAll(['letters', `${AXES[axis]}-number`]);
   // the other two angles stay, also if they are names
   const { angles_deg: own } = chosen();
@@ -117,7 +105,7 @@ function setAngle(axis, value, as) {
   }, as);
 }
 
-function makeSliders() {
+export function makeSliders() {
   AXES.forEach((axis, k) => {
     const range = element('input', { type: 'range', min: -180, max: 180, id: axis });
     const number = element('input', { id: `${axis}-number`, inputMode: 'decimal', autocomplete: 'off' });
@@ -125,17 +113,11 @@ function makeSliders() {
     const marks = element('div', { className: 'marks', id: `${axis}-marks` });
     marks.setAttribute('aria-hidden', 'true');
     const label = element('label', { htmlFor: axis, textContent: axis });
-    range.addEventListener('pointerdown', () => { gesture = null; });
-    range.addEventListener('input', () => {
-      live.began = performance.now();
-      strip.axis = k;
-      setAngle(k, Number(range.value), `slide ${state.selected} ${k}`);
-    });
-    range.addEventListener('focus', () => { strip.axis = k; drawStrip(); });
+    range.addEventListener('pointerdown', endGesture);
+    range.addEventListener('input', () => setAngle(k, Number(range.value), `slide ${state.selected} ${k}`));
     number.addEventListener('change', () => {
       const x = finite(number.value);
       if (Number.isNaN(x)) return void fault(number.id, `${axis}: expected a number of degrees, found "${number.value}"`);
-      strip.axis = k;
       setAngle(k, x);
     });
     $('sliders').append(element('div', { className: 'slider' }, label, range, number, marks));
@@ -147,10 +129,8 @@ function makeSliders() {
 
 // the position that the fields are of
 let drawn = null;
-/** An angle in degrees as the sliders have it, from -180 to 180. */
-const withinTurn = (angle) => (Math.abs(angle) <= 180 ? angle : angle - 360 * Math.round(angle / 360));
 
-function drawSelected() {
+export function drawSelected() {
   const p = chosen();
   // errors of another position are not errors of this one
   if (p !== drawn) mendAll(OF_POSITION);
@@ -163,7 +143,7 @@ function drawSelected() {
     $(axis).disabled = !angles;
     $(axis).setAttribute('aria-valuetext', angles ? `${shown(angles[k])} degrees` : 'by name');
     // what is typed has been taken over, or refused
-    const kind = faults.get(`${axis}-number`);
+    const kind = faultOf(`${axis}-number`);
     if (kind !== 'own') $(`${axis}-number`).value = angles && kind !== 'engine' ? shown(angles[k]) : String(p?.angles_deg?.[k] ?? '');
   });
   fill('letters', angles && lettersOf(matrixOf(angles)));
@@ -172,84 +152,7 @@ function drawSelected() {
   canvasSoon();
 }
 
-/** Number in a field; undefined if the field is empty, NaN if it holds no number. */
-const numberIn = (e) => (e.value.trim() === '' ? undefined : finite(e.value));
-const finite = (text) => {
-  const plain = text?.trim().replace('\u2212', '-') ?? '', x = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
-  return Number.isFinite(x) ? x : NaN;
-};
-
-/** Sets a value of the scheme, or removes it. */
-function setKey(path, value, as) {
-  edit((s) => {
-    const keys = path.split('.'), last = keys.pop();
-    const at = keys.reduce((o, k) => (o[k] ??= {}), s);
-    if (value === undefined) delete at[last]; else at[last] = value;
-  }, as);
-}
-
-/** Names and numbers such as `D = 0.05, psi = 0.01`; NaN for what is no number, or a name that comes twice. */
-function assignments(text) {
-  const out = {};
-  for (const part of text.split(',').filter((t) => t.trim())) {
-    const [name, ...values] = part.split('=').map((x) => x.trim());
-    out[name || part] = !name || values.length !== 1 || name in out ? NaN : finite(values[0]);
-  }
-  return out;
-}
-
-/** Limits of gimbals such as `alpha=-90:90, beta=-80:80` as a table of a scheme file; null for another text. */
-function gimbalLimits(text) {
-  const out = {};
-  for (const part of text.split(',').filter((t) => t.trim())) {
-    const found = /^\s*(alpha|beta|gamma)\s*=\s*([^:]+):([^:]+)$/.exec(part), ends = found?.slice(2).map(finite);
-    if (!found || ends.some(Number.isNaN) || `${found[1]}_deg` in out) return null;
-    out[`${found[1]}_deg`] = ends;
-  }
-  return out;
-}
-/** Gimbal limits in a field; null for another text, which is marked there. */
-function limitsIn(id) {
-  const limits = gimbalLimits($(id).value);
-  if (!limits) fault(id, `Gimbal limits: expected angles and degrees such as alpha=-90:90, beta=-80:80, found "${$(id).value}"`);
-  return limits;
-}
-const limitsText = (gimbals = {}) => AXES.filter((axis) => gimbals[`${axis}_deg`]).map((axis) => `${axis}=${gimbals[`${axis}_deg`].join(':')}`).join(', ');
-
-function wireConditions() {
-  const field = (id, path, read) => $(id).addEventListener('change', () => {
-    const value = read($(id));
-    if (Number.isNaN(value) || (isPlain(value) && Object.values(value).some(Number.isNaN))) {
-      const wanted = isPlain(value) ? `names and numbers such as ${id === 'bench' ? 'K0 = 20' : 'D = 0.05'}` : 'a number';
-      return void fault(id, `${labelOf(id)}: expected ${wanted}, found "${$(id).value}"`);
-    }
-    mend(id);
-    setKey(path, value);
-  });
-  const text = (e) => e.value.trim() || undefined;
-  field('carry', 'carry', text);
-  field('terms', 'terms', (e) => (e.value.trim() === 'drift' ? 'drift' : text(e)?.split(',').map((t) => t.trim()).filter(Boolean)));
-  field('dwell', 'simulation.dwell_s', numberIn);
-  field('noise', 'simulation.accelerometer_noise_g', numberIn);
-  field('drift-noise', 'simulation.drift_noise', text);
-  field('latitude-number', 'latitude_deg', numberIn);
-  field('slew-rate', 'simulation.slew_rate_deg_s', numberIn);
-  $('gimbals').addEventListener('change', () => {
-    const limits = limitsIn('gimbals');
-    if (!limits) return;
-    mend('gimbals');
-    setKey('gimbals', Object.keys(limits).length ? limits : undefined);
-  });
-  for (const table of ['requirements', 'bench']) field(table, table, (e) => (e.value.trim() ? assignments(e.value) : undefined));
-  $('latitude').addEventListener('pointerdown', () => { gesture = null; });
-  $('latitude').addEventListener('input', () => {
-    mend('latitude-number');
-    setKey('latitude_deg', Number($('latitude').value), 'latitude');
-  });
-  $('generic').addEventListener('click', () => {
-    mend('latitude-number');
-    setKey('latitude_deg', undefined);
-  });
+export function wirePositions() {
   $('letters').addEventListener('change', () => {
     const letters = $('letters').value.trim().toUpperCase();
     if (!matrixOfLetters(letters)) return void fault('letters', `X_p Y_p Z_p: expected directions of right-handed axes such as NUE, found "${letters}"`);
@@ -262,7 +165,7 @@ function wireConditions() {
     mend(id);
     edit(() => { if (value === undefined) delete chosen()[key]; else chosen()[key] = value; });
   });
-  own('name', 'name', text);
+  own('name', 'name', (e) => e.value.trim() || undefined);
   own('own-dwell', 'dwell_s', numberIn);
   $('add').addEventListener('click', () => edit((s) => {
     s.position.push({ angles_deg: [0, 0, 0] });
@@ -284,22 +187,6 @@ function wireConditions() {
     e.preventDefault();
     const at = indexOf(e.target);
     if (e.altKey) move(at, at + by, true);
-    else if (state.scheme.position[at + by]) select(at + by, true);
+    else if (state.scheme.position[at + by]) { select(at + by); focusOn(at + by); }
   });
-}
-
-function drawConditions() {
-  const s = state.scheme, run = s.simulation ?? {};
-  fill('carry', s.carry ?? 'platform');
-  fill('terms', Array.isArray(s.terms) ? s.terms.join(',') : s.terms ?? 'F,I,O,S');
-  fill('dwell', run.dwell_s);
-  fill('noise', run.accelerometer_noise_g);
-  fill('drift-noise', run.drift_noise);
-  fill('latitude-number', s.latitude_deg);
-  fill('slew-rate', run.slew_rate_deg_s);
-  fill('gimbals', limitsText(s.gimbals));
-  $('latitude').value = s.latitude_deg ?? 28.2;
-  $('latitude-note').textContent = s.latitude_deg === undefined ? 'Verdicts hold at nearly every latitude; sigmas and the arrow of the earth rate are of 28.2 deg.' : '';
-  $('latitude').setAttribute('aria-valuetext', s.latitude_deg === undefined ? 'generic' : `${s.latitude_deg} degrees`);
-  for (const table of ['requirements', 'bench']) fill(table, Object.entries(s[table] ?? {}).map(([k, v]) => `${k} = ${v}`).join(', '));
 }

@@ -1,14 +1,16 @@
 // The table of verdicts: changes, links between indistinguishable unknowns, sigmas against requirements.
+import { $, closable, element, put, putMath, putName, putSolution, tableOf, two } from './dom.js';
+import { edit, state } from './scheme.js';
+import { byName, verdicts } from './verdicts.js';
 
-const WORDS = { observable: 'observable', inseparable: 'inseparable', not_excited: 'not excited', unobservable: 'not observable', not_seen: 'not seen' };
-// verdicts of the current scheme and of the one before the last gesture; sigmas by name
-const verdicts = { now: null, before: null, sigmas: null, without: null, omitted: null, sigmasOf: null, solutions: null, solutionsOf: null };
-
-/** Makes the verdicts of the table those that later changes are compared with. */
-function emphasise() { verdicts.before = verdicts.now ?? verdicts.before; }
-
+export const WORDS = { observable: 'observable', inseparable: 'inseparable', not_excited: 'not excited', unobservable: 'not observable', not_seen: 'not seen' };
 const verdictOf = (q) => (q.degree === null || q.degree === undefined ? WORDS[q.status] ?? q.status : String(q.degree));
-const byName = (answer) => new Map((answer?.quantities ?? []).map((q) => [q.name, q]));
+
+export const isStale = () => $('verdicts').classList.contains('stale');
+/** Makes the answers faint if they are of another scheme. */
+export function fade(on) {
+  for (const id of ['verdicts', 'sentences', 'remedies', 'not-estimated']) $(id).classList.toggle('stale', on);
+}
 
 function cell(row, index, className) {
   while (row.children.length <= index) row.append(document.createElement(row.children.length === 1 ? 'th' : 'td'));
@@ -18,25 +20,27 @@ function cell(row, index, className) {
   return e;
 }
 
-const put = (e, text) => { if (e.textContent !== text) e.textContent = text; };
-function putMath(e, math, text) {
-  const key = math || text;
-  if (e.dataset.of === key) return;
-  e.dataset.of = key;
-  if (math) e.innerHTML = math; else e.replaceChildren(text.length > 60 ? element('code', { textContent: text }) : text);
+/** The button that shows the name of an unknown in a cell and explains its verdict. */
+function whyButton(td) {
+  let button = td.querySelector('button.why');
+  if (!button) {
+    button = element('button', { type: 'button', className: 'why', title: 'Why this verdict, and what changes it' });
+    delete td.dataset.of;
+    td.replaceChildren(button);
+  }
+  return button;
 }
 
-/** A name as a formula, and as a text for screen readers. */
-function putName(e, math, name) {
-  if (e.dataset.of === (math || name)) return;
-  putMath(e, math, name);
-  if (!math) return;
-  e.firstElementChild.setAttribute('aria-hidden', 'true');
-  e.append(element('span', { className: 'unseen', textContent: name }));
+/** Removes the button from a cell. */
+function noWhy(td) {
+  if (!td.querySelector('button.why')) return td;
+  delete td.dataset.of;
+  td.replaceChildren();
+  return td;
 }
 
 /** Draws the answer about the scheme. */
-function drawVerdicts() {
+export function drawVerdicts() {
   const box = $('verdicts'), answer = verdicts.now?.answer;
   if (!answer || isStale()) return;
   let table = box.querySelector('table');
@@ -91,7 +95,6 @@ function drawVerdicts() {
   put($('summary'), `rank ${answer.rank} of ${answer.unknowns.length}; ${open.length ? `${alone} observable${together}` : `all observable, largest degree ${worst}`}${changes ? `; ${changes} changed` : ''}${met}${verdicts.sigmasOf === scheme && verdicts.without ? `; no sigmas: ${verdicts.without}` : ''}`);
   drawSentences($('sentences'), verdicts.now.sentences);
   drawRemedies(answer.to_resolve);
-  offerStrip(rows);
 }
 
 /** Classes of the terms of a family in words: one class for all, or the number of terms in each. */
@@ -102,7 +105,7 @@ function classes(f) {
 }
 
 /** Draws the families of errors that are not estimated, and the change of the estimates per unit of each. */
-function drawOmitted(omitted) {
+export function drawOmitted(omitted) {
   $('not-estimated').hidden = !omitted;
   if (!omitted) return;
   const used = omitted.families.some((f) => f.uses_up);
@@ -139,7 +142,7 @@ function drawTerms(omitted, family) {
  * Errors that are not estimated and change the estimate of an unknown, those of a stated size first, the
  * largest change before; null if there are none.
  */
-function changersOf(omitted, name) {
+export function changersOf(omitted, name) {
   const found = (omitted?.terms ?? []).flatMap((t) => t.sensitivities.filter((x) => x.unknown === name).map((x) => [t, x]));
   if (!found.length) return null;
   const effect = ([t, x]) => Math.abs(x.per_unit) * (t.size ?? 0);
@@ -155,7 +158,7 @@ function changersOf(omitted, name) {
 const RESOLVE = 'To resolve ';
 
 /** Shows the first lines of the answer: the verdict in a sentence, then what resolves the rest. */
-function drawSentences(e, sentences = []) {
+export function drawSentences(e, sentences = []) {
   if (e.dataset.of === sentences.join('\n')) return;
   e.dataset.of = sentences.join('\n');
   const [rest, remedies] = [false, true].map((of) => sentences.filter((text) => text.startsWith(RESOLVE) === of));
@@ -176,7 +179,7 @@ function changeOf(change) {
 }
 
 /** Buttons that make single changes which resolve unknowns. */
-function drawRemedies(resolve) {
+export function drawRemedies(resolve) {
   const all = (resolve?.remedies ?? []).filter((r) => r.changes.length === 1).map((r) => [r, changeOf(r.changes[0])]).filter(([, change]) => change);
   const key = JSON.stringify(all);
   if ($('remedies').dataset.of === key) return;
@@ -190,18 +193,6 @@ function drawRemedies(resolve) {
 }
 
 const WHY = { not_excited: 'never moves Z', inseparable: 'moves Z only together with others', not_seen: 'not seen up to the last derivative' };
-// number of terms from which a solution is folded
-const SHORT = 8;
-
-/** A solution as a formula, folded where it has many terms. */
-function putSolution(e, math, text, terms) {
-  if (terms <= SHORT) return putMath(e, math, text);
-  if (e.dataset.of === text) return;
-  e.dataset.of = text;
-  const inner = element('div'), fold = element('details', {}, element('summary', { textContent: `${terms} terms` }), inner);
-  fold.addEventListener('toggle', () => putMath(inner, math, text), { once: true });
-  e.replaceChildren(fold);
-}
 
 function drawSolution(td, q, name) {
   const solved = verdicts.solutions?.find(name);
@@ -216,9 +207,6 @@ function drawSolution(td, q, name) {
     .map(([d, what]) => `degree ${d} at other ${what}`).join('; ');
   putMath(td, '', where ? `${why}; ${where}` : why);
 }
-
-/** Two significant digits, without an exponent for large numbers. */
-const two = (x) => (x >= 100 && x < 1e7 ? String(Number(x.toPrecision(2))) : x.toPrecision(2));
 
 function drawSigma(td, name) {
   const s = name && verdicts.sigmas?.get(name);
@@ -276,14 +264,4 @@ function drawLinks(rows) {
     }
   });
   svg.replaceChildren(...parts);
-}
-
-function tableOf(heads, rows, caption = '') {
-  const table = element('table', {}, ...(caption ? [element('caption', { textContent: caption })] : []), element('thead'), element('tbody'));
-  table.tHead.append(element('tr', {}, ...heads.map((h) => element('th', { scope: 'col', textContent: h }))));
-  for (const row of rows) {
-    const cells = row.map((x) => (x instanceof Node ? element('td', {}, x) : element('td', { textContent: x ?? '' })));
-    table.tBodies[0].append(element('tr', {}, ...cells));
-  }
-  return table;
 }

@@ -1,4 +1,12 @@
 // Five steps that show the use of the page; each sets its scheme.
+import { $, put } from './dom.js';
+import { live } from './engine.js';
+import { say } from './notice.js';
+import { copy, replace, select, source, state } from './scheme.js';
+import { drawVerdicts } from './table.js';
+import { show } from './tabs.js';
+import { writing } from './text.js';
+import { verdicts } from './verdicts.js';
 
 const SIX = [[10, 25, 40], [130, -50, 70], [-95, 33, -160], [60, 80, 15], [-20, -70, 110], [170, 15, -75]].map((angles_deg) => ({ angles_deg }));
 // the control of a step is framed; `against` is the step whose verdicts the table compares with
@@ -78,6 +86,11 @@ function quitTour() {
   beforeTour = null;
 }
 
+/** Closes the tour if the scheme was opened, or replaced by one that is not of the tour. */
+export function leaveTour(opened) {
+  if (opened || state.name !== TOUR_FILE) quitTour();
+}
+
 /** Ends the tour: the scheme from before it is back. */
 function endTour() {
   const { scheme, name, selected } = beforeTour;
@@ -98,11 +111,11 @@ async function compareWith(step) {
   const found = await live.ask('verdicts', [request], { topic: 'tour' }).catch(() => null);
   if (!found?.answer || mine !== tourStep) return;
   verdicts.before = found;
-  await answered;
+  await verdicts.answered;
   drawVerdicts();
 }
 
-function wireTour() {
+export function wireTour() {
   $('start-tour').addEventListener('click', () => {
     beforeTour ??= copy({ scheme: state.scheme, name: state.name, selected: state.selected });
     tourStep = 0;

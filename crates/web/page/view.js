@@ -1,18 +1,24 @@
-// The platform in three dimensions, as in reports: North to the right, Up upwards, East towards the reader.
+// Canvases, and the platform in three dimensions as in reports: North to the right, Up upwards, East to the reader.
+import { $ } from './dom.js';
+import { LETTERS, RAD, matrixOf, times, turn, turnBetween } from './geometry.js';
+import { anglesOfPosition, chosen, select, shown, state } from './scheme.js';
 
-const look = { azimuth: 40 * RAD, elevation: 20 * RAD };
-// attitude during a shown slew
-let onTheWay = null;
+// functions that draw a canvas
+const drawings = [];
+/** Adds a function that draws a canvas again. */
+export const onDraw = (draw) => drawings.push(draw);
 
 // colours of the page by name; cleared when the preferred colour scheme changes
 const palette = new Map();
-function color(name) {
+export const clearColors = () => palette.clear();
+
+export function color(name) {
   if (!palette.has(name)) palette.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
   return palette.get(name);
 }
 
 /** Drawing context and size in pixels of a canvas at the resolution of the screen. */
-function sheet(canvas) {
+export function sheet(canvas) {
   const scale = window.devicePixelRatio || 1, [w, h] = [canvas.clientWidth, canvas.clientHeight];
   if (canvas.width !== Math.round(w * scale) || canvas.height !== Math.round(h * scale)) {
     canvas.width = Math.round(w * scale);
@@ -24,6 +30,10 @@ function sheet(canvas) {
   c.font = '13px system-ui, sans-serif';
   return [c, w, h];
 }
+
+const look = { azimuth: 40 * RAD, elevation: 20 * RAD };
+// attitude during a shown slew
+let onTheWay = null;
 
 /** Components of a vector to the right, downwards and towards the reader. */
 function seen([n, u, e]) {
@@ -44,7 +54,7 @@ function axisOf(c, text) {
  * Draws the platform at an attitude (its axes as columns, in North, Up, East), on a canvas; without an attitude
  * the directions of the site alone. Returns the directions of the axes in words. `small` leaves out the gyros.
  */
-function drawPlatform(canvas, m, { small = false } = {}) {
+export function drawPlatform(canvas, m, { small = false } = {}) {
   const [c, w, h] = sheet(canvas), unit = Math.min(w, h) * (small ? 0.27 : 0.3);
   const at = (v, k = 1) => { const [x, y] = seen(v); return [w / 2 + unit * k * x, h / 2 + unit * k * y]; };
   const line = (from, to, stroke, width, dash = []) => {
@@ -139,7 +149,8 @@ function showSlew() {
   requestAnimationFrame(step);
 }
 
-function wireView() {
+export function wireView() {
+  onDraw(drawView);
   const canvas = $('view');
   let from = null;
   canvas.addEventListener('pointerdown', (e) => { from = [e.clientX, e.clientY, look.azimuth, look.elevation]; canvas.setPointerCapture(e.pointerId); });
@@ -165,8 +176,9 @@ function turnLook(azimuth, elevation) {
 }
 
 let soon = false;
-function canvasSoon() {
+/** Draws all canvases at the next frame. */
+export function canvasSoon() {
   if (soon) return;
   soon = true;
-  requestAnimationFrame(() => { soon = false; drawView(); drawStrip(); drawWinner.again(); });
+  requestAnimationFrame(() => { soon = false; drawings.forEach((draw) => draw()); });
 }

@@ -1,35 +1,15 @@
 // Explanations of single verdicts, and the next position of the scheme.
-
-/** The button that shows the name of an unknown in a cell and explains its verdict. */
-function whyButton(td) {
-  let button = td.querySelector('button.why');
-  if (!button) {
-    button = element('button', { type: 'button', className: 'why', title: 'Why this verdict, and what changes it' });
-    delete td.dataset.of;
-    td.replaceChildren(button);
-  }
-  return button;
-}
-
-/** Removes the button from a cell. */
-function noWhy(td) {
-  if (!td.querySelector('button.why')) return td;
-  delete td.dataset.of;
-  td.replaceChildren();
-  return td;
-}
-
-/** The heading of a box, with a button that closes it. */
-function closable(box, heading) {
-  const close = element('button', { type: 'button', textContent: 'Close' });
-  close.addEventListener('click', () => { box.hidden = true; box.replaceChildren(); });
-  return element('div', { className: 'titled' }, element('h3', { textContent: heading }), close);
-}
+import { $, closable, element, tableOf, two } from './dom.js';
+import { behind } from './engine.js';
+import { inPageWords } from './fields.js';
+import { copy, edit, positionOf, source, state } from './scheme.js';
+import { changersOf } from './table.js';
+import { verdicts } from './verdicts.js';
 
 const questionOf = (named, name) => JSON.stringify([named, name]);
 
 /** Explains the verdict on an unknown of a text; the answer replaces the content of a box. `more` has options. */
-async function explain(box, named, name, more = {}) {
+export async function explain(box, named, name, more = {}) {
   const question = questionOf(named, name);
   // an explanation that follows an edit leaves the page where the edit is
   const again = !box.hidden && box.dataset.name === name;
@@ -65,7 +45,7 @@ function addChangers() {
 }
 
 /** Asks again for an open explanation of an earlier scheme. */
-function explainAgain() {
+export function explainAgain() {
   addChangers();
   const box = $('why');
   if (!box.hidden && box.dataset.question !== questionOf(source(state.scheme), box.dataset.name)) explainScheme(box.dataset.name);
@@ -95,14 +75,16 @@ async function nextPosition() {
   box.replaceChildren(...texts, tableOf(['position', 'X_p Y_p Z_p', 'largest degree', 'undetermined', 'worst sigma [deg/h, per g]'], rows));
 }
 
-function wireWhy() {
+export function wireWhy() {
   $('verdicts').addEventListener('click', (e) => {
     const name = e.target.closest('button.why')?.closest('tr').dataset.name;
     if (name) explainScheme(name);
   });
   $('next-position').addEventListener('click', nextPosition);
-  listeners.push(() => {
-    $('next').hidden = true;
-    $('why').classList.add('stale');
-  });
+}
+
+/** Hides the next position and makes an explanation faint: both are of another scheme. */
+export function fadeWhy() {
+  $('next').hidden = true;
+  $('why').classList.add('stale');
 }

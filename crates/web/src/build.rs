@@ -13,26 +13,20 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use wasm_bindgen_cli_support::Bindgen;
 
+use crate::link::{LinkError, linked};
+
 const TEMPLATE: &str = include_str!("../page/page.html");
 const STYLE: &str = include_str!("../page/page.css");
 const WORKER: &str = include_str!("../page/worker.js");
 /// Script that stands for the engine in a draft.
 const DRAFT: &str = include_str!("../page/draft.js");
-/// Scripts of the page, in the order in which they run.
-const SCRIPTS: [&str; 12] = [
-    include_str!("../page/engine.js"),
-    include_str!("../page/geometry.js"),
-    include_str!("../page/scheme.js"),
-    include_str!("../page/fields.js"),
-    include_str!("../page/positions.js"),
-    include_str!("../page/view.js"),
-    include_str!("../page/table.js"),
-    include_str!("../page/why.js"),
-    include_str!("../page/ask.js"),
-    include_str!("../page/design.js"),
-    include_str!("../page/tour.js"),
-    include_str!("../page/main.js"),
-];
+macro_rules! scripts {
+    ($($file:literal)*) => { &[$(($file, include_str!(concat!("../page/", $file)))),*] };
+}
+/// Scripts of the page, each a file and its text.
+pub(crate) const SCRIPTS: &[(&str, &str)] = scripts!["dom.js" "geometry.js" "engine.js" "scheme.js"
+    "fields.js" "notice.js" "view.js" "positions.js" "conditions.js" "verdicts.js" "table.js" "sweep.js"
+    "why.js" "ask.js" "tabs.js" "design.js" "text.js" "tour.js" "main.js"];
 
 /// Error that ends the build of the page.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +43,9 @@ pub(crate) enum BuildError {
     /// The script between page and engine could not be made.
     #[error("no glue: {0}")]
     Glue(String),
+    /// The scripts of the page do not fit together.
+    #[error("no script: {0}")]
+    Script(#[from] LinkError),
     /// The template of the page could not be filled in.
     #[error("no page: {0}")]
     Page(#[from] minijinja::Error),
@@ -113,7 +110,7 @@ fn root() -> PathBuf {
 /// Writes a page with an engine; returns its path and number of bytes.
 fn written(asked: Option<PathBuf>, name: &str, engine: &PageEngine) -> Result<(PathBuf, usize), BuildError> {
     let root = root();
-    let script = format!("'use strict';(() => {{\n{}\n}})();", SCRIPTS.join("\n"));
+    let script = format!("'use strict';(() => {{\n{}}})();", linked(SCRIPTS)?);
     let data = json!({
         "worker": format!("{}\n{WORKER}", engine.script),
         "unpack": engine.unpack,

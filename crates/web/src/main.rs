@@ -9,6 +9,10 @@ mod build;
 mod draft;
 #[cfg(not(target_arch = "wasm32"))]
 mod engine;
+#[cfg(not(target_arch = "wasm32"))]
+mod link;
+#[cfg(not(target_arch = "wasm32"))]
+mod tokens;
 
 #[cfg(not(target_arch = "wasm32"))]
 #[expect(clippy::print_stdout, clippy::print_stderr, reason = "a program")]
