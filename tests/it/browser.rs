@@ -4,32 +4,41 @@ use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
-/// Browser with one page.
-pub(crate) struct Browser {
+/// Running browser, which all tests of a program share as long as one of them has a page.
+struct Process {
     child: Child,
-    socket: WebSocket<TcpStream>,
-    session: Option<String>,
-    next: u64,
-    /// Events of the page: console messages, exceptions, requests.
-    pub(crate) events: Vec<Value>,
+    /// Address of the web socket that commands go to.
+    url: String,
     _profile: tempfile::TempDir,
 }
 
-impl Drop for Browser {
+impl Drop for Process {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-impl Browser {
-    /// Starts the installed browser; `None` if there is none.
-    pub(crate) fn start() -> Option<Self> {
+impl Process {
+    /// The running browser, or the installed one, started; `None` if there is none.
+    fn shared() -> Option<Arc<Self>> {
+        static SHARED: Mutex<Weak<Process>> = Mutex::new(Weak::new());
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(running) = shared.upgrade() {
+            return Some(running);
+        }
+        let started = Arc::new(Self::start()?);
+        *shared = Arc::downgrade(&started);
+        Some(started)
+    }
+
+    fn start() -> Option<Self> {
         let names = ["chromium", "chromium-browser", "google-chrome"];
         let folders = std::env::var_os("PATH")?;
         let program = std::env::split_paths(&folders)
@@ -39,7 +48,9 @@ impl Browser {
         let mut child = Command::new(program)
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
             .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
-            .args(["--remote-debugging-port=0", "about:blank"])
+            // pages of several tests are drawn at the same time, as if each were in front
+            .args(["--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding"])
+            .args(["--disable-background-timer-throttling", "--remote-debugging-port=0", "about:blank"])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -53,18 +64,61 @@ impl Browser {
             .expect("the browser listens");
         // further output is read, so that it does not fill the pipe
         std::thread::spawn(move || lines.for_each(drop));
-        let address = url.strip_prefix("ws://").and_then(|u| u.split('/').next()).expect("an address");
-        let stream = TcpStream::connect(address).expect("a connection");
+        Some(Self { child, url, _profile: profile })
+    }
+}
+
+/// Browser with one page, whose storage and downloads are its own.
+pub(crate) struct Browser {
+    socket: WebSocket<TcpStream>,
+    session: Option<String>,
+    /// Identifier of its storage.
+    pub(crate) context: Value,
+    next: u64,
+    /// Events of the page: console messages, exceptions, requests.
+    pub(crate) events: Vec<Value>,
+    _process: Arc<Process>,
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // closes the page
+        let request = json!({ "id": 0, "method": "Target.disposeBrowserContext",
+            "params": { "browserContextId": self.context } });
+        let _ = self.socket.send(Message::text(request.to_string()));
+        let _ = self.socket.close(None);
+        let _ = self.socket.flush();
+    }
+}
+
+impl Browser {
+    /// Opens an empty page in the installed browser; `None` if there is none.
+    pub(crate) fn start() -> Option<Self> {
+        let process = Process::shared()?;
+        let address = process.url.strip_prefix("ws://").and_then(|u| u.split('/').next());
+        let stream = TcpStream::connect(address.expect("an address")).expect("a connection");
         stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a time limit");
-        let (socket, _) = tungstenite::client(url.as_str(), stream).expect("a web socket");
-        let mut out = Self { child, socket, session: None, next: 0, events: Vec::new(), _profile: profile };
-        let target = out.call("Target.createTarget", json!({ "url": "about:blank" }));
+        let (socket, _) = tungstenite::client(process.url.as_str(), stream).expect("a web socket");
+        let mut out = Self {
+            socket,
+            session: None,
+            context: json!(""),
+            next: 0,
+            events: Vec::new(),
+            _process: process,
+        };
+        out.context = out.call("Target.createBrowserContext", json!({}))["browserContextId"].clone();
+        let target = out.call(
+            "Target.createTarget",
+            json!({ "url": "about:blank", "browserContextId": out.context, "newWindow": true }),
+        );
         let attached =
             out.call("Target.attachToTarget", json!({ "targetId": target["targetId"], "flatten": true }));
         out.session = attached["sessionId"].as_str().map(Into::into);
         for domain in ["Page", "Runtime", "Log", "Network"] {
             out.call(&format!("{domain}.enable"), json!({}));
         }
+        out.call("Emulation.setFocusEmulationEnabled", json!({ "enabled": true }));
         Some(out)
     }
 

@@ -74,6 +74,13 @@ pub(crate) fn opened(width: u32) -> Option<(Browser, &'static Path)> {
     Some((browser, page))
 }
 
+/// Saves downloads of the page in a folder.
+pub(crate) fn save_in(browser: &mut Browser, folder: &Path) {
+    let context = browser.context.clone();
+    let saved = json!({ "behavior": "allow", "downloadPath": folder, "browserContextId": context });
+    browser.call("Browser.setDownloadBehavior", saved);
+}
+
 pub(crate) fn wait(browser: &mut Browser, what: &str, condition: &str) {
     let patience = Instant::now() + Duration::from_secs(120);
     while browser.value(&format!("!!({condition})")) != json!(true) {

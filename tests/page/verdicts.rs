@@ -9,7 +9,7 @@ use regex::Regex;
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
-use crate::opened::{choose, click, is_built, key, opened, quiet, root, says, scheme, wait, write};
+use crate::opened::{choose, click, is_built, key, opened, quiet, root, save_in, says, scheme, wait, write};
 use crate::program::{cases, run};
 
 #[test]
@@ -92,8 +92,7 @@ fn its_json_is_that_of_the_command_line() {
 fn schemes_come_and_go() {
     let Some((mut browser, page)) = opened(1400) else { return };
     let folder = tempfile::tempdir().expect("a folder");
-    let saved = folder.path().display().to_string();
-    browser.call("Browser.setDownloadBehavior", json!({ "behavior": "allow", "downloadPath": saved }));
+    save_in(&mut browser, folder.path());
     let b = &mut browser;
     let whole = |name: &str| {
         let patience = Instant::now() + Duration::from_secs(60);
