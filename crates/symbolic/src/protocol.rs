@@ -8,9 +8,6 @@ pub(crate) const PREFIX: &str = "obsdeg:";
 /// Unit of work: number of products of terms that take about half a second.
 pub const UNIT: u64 = 5_000_000;
 
-/// Processor time per unit of work, in s: the limit for work that cannot be counted.
-pub(crate) const SECONDS_PER_UNIT: u64 = 2;
-
 /// Request with its limit of work.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Order {

@@ -12,11 +12,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::lock;
-use crate::protocol::{Job, Order, PREFIX, Request, Response, SECONDS_PER_UNIT, UNIT};
+use crate::protocol::{Job, Order, PREFIX, Request, Response, UNIT};
 use tower::Tower;
 
 /// Interval between two checks of the processor time of a job.
 const WATCH: Duration = Duration::from_millis(20);
+
+/// Processor time per unit of work, in s: the limit for work that cannot be counted.
+const SECONDS_PER_UNIT: u64 = 2;
 
 /// Error of a job.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
