@@ -74,7 +74,9 @@ pub(crate) struct Arguments {
 fn words(arg: Arg) -> Arg {
     match arg.get_id().as_str() {
         "output" => arg.help("Write calibration, coefficients, residuals and figures to a folder"),
-        "carry" => arg.help("What is carried between positions (default: that of the scheme)"),
+        "carry" => {
+            arg.help("Quantity that continues from one position to the next (default: that of the scheme)")
+        }
         "latitude" => arg.help("Latitude in degrees (default: that of the scheme, or 28.2)"),
         _ => arg,
     }

@@ -47,7 +47,7 @@ fn words(arg: Arg) -> Arg {
         "files" => arg.help("Scheme files (TOML); - is stdin"),
         // `--model` is refused; the message names the command that judges models
         "model" => arg.hide(true),
-        "carry" => arg.help("What is carried between positions, for all schemes"),
+        "carry" => arg.help("Quantity that continues from one position to the next, for all schemes"),
         "latitude" => arg.help("Latitude in degrees, for all schemes (default: that of the file, or 28.2)"),
         _ => arg,
     }

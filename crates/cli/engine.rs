@@ -14,7 +14,7 @@ use crate::progress::Spinner;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Solutions")]
 pub(crate) struct EngineArguments {
-    /// How much work the symbolic engine may do for one formula, 0 (none) to 1000000: a unit is five million
+    /// Largest work of the symbolic engine for one formula, 0 (none) to 1000000: a unit is five million
     /// products of terms, about half a second, and ends at the same place on every machine and under any
     /// load. What cannot be counted (factorisation) ends after two seconds of processor time per unit
     #[arg(long, value_name = "UNITS", default_value_t = 5, value_parser = whole::<u64>(0..=1_000_000))]

@@ -169,7 +169,7 @@ const LINES: &[(&str, Section, &str)] = &[
     ("quiet", OUTPUT, "Say nothing on stderr but errors and what is missing in the answer"),
     ("shell", None, "Shell: bash, elvish, fish, powershell or zsh"),
     ("command", None, "Command whose page it is (default: that of the program)"),
-    ("kind", None, "What the schema describes, such as analysis, design or scheme"),
+    ("kind", None, "Answer or file that the schema describes, such as analysis, design or scheme"),
 ];
 
 /// `command` with a line for every option, and with its examples and notes in `--help` only. `short`: true

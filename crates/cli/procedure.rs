@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use obsdeg_commands::{Given, Procedure, procedure};
+use obsdeg_commands::{Given, ProcedureRequest, procedure};
 
 use crate::arguments::{Files, RequireMet, one_file, with_latitude};
 use crate::failure::Failure;
@@ -34,7 +34,7 @@ const RECORD: &str = "record.csv";
 #[command(after_help = AFTER_HELP, mut_args(one_file), mut_args(to_a_folder), mut_args(with_latitude))]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    asked: Procedure,
+    asked: ProcedureRequest,
 
     #[command(flatten)]
     files: Files,

@@ -83,7 +83,7 @@ fn words(arg: Arg) -> Arg {
         "files" => arg.required_unless_present("calibration"),
         "output" => arg.required(true).help("The file to be written"),
         "force" => arg.help("Replace existing files"),
-        "carry" => arg.help("What is carried between positions, for all schemes"),
+        "carry" => arg.help("Quantity that continues from one position to the next, for all schemes"),
         "latitude" => arg.help(
             "Latitude in degrees, for all schemes (default: that of the file; 28.2 where numbers need one)",
         ),

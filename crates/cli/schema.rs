@@ -75,7 +75,7 @@ enum SchemaKind {
 
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// What the schema describes
+    /// Answer or file that the schema describes
     kind: SchemaKind,
 }
 

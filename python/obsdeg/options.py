@@ -20,29 +20,30 @@ Names = Union[str, Sequence[str]]
 
 
 class Seeded(TypedDict, total=False):
-    """What is drawn at random."""
+    """Random choices."""
 
     seed: int
     """Seed of all random choices [default: 1]."""
 
 
 class Assumed(TypedDict, total=False):
-    """What holds of schemes, whatever their files say."""
+    """Assumptions that hold for all schemes, whatever their files state."""
 
     carry: Carry | None
-    """What is carried between positions: psi in platform axes, as in the paper, in geographic axes (real torqued slews), or a psi of its own each."""
+    """Quantity that continues from one position to the next: psi in platform axes, as in the paper, psi in geographic axes (real torqued slews),
+    or none (a psi of its own each)."""
     latitude: Number | None
     """Latitude in degrees, exact; left out: generic, or 28.2 where numbers need one."""
 
 
 class Terms(TypedDict, total=False):
-    """What is unknown."""
+    """Unknowns of the model."""
 
     terms: Names
     """Unknown terms: F, I, O, S, II, OO, SS, IO, IS, OS (drifts of gyros), GS, GM, GM3 (torquers), K0, K1, M6, M3, K2, K3, Kx (accelerometers), or
     the families gyros, accelerometers, all; or drift for eps^n of one position."""
     axes: Literal["accelerometers", "gyros", "body"]
-    """What defines the platform axes, and so which misalignments the families have."""
+    """Definition of the platform axes, and so which misalignments the families have."""
 
 
 class Positions(Assumed, Terms, total=False):
@@ -54,7 +55,7 @@ class Positions(Assumed, Terms, total=False):
     combination: Names
     """Linear combinations of unknowns to be judged too, such as ``"D_IX - D_IY"``."""
     path: Literal["one-axis", "gimbals"]
-    """How the platform is turned from one position to the next: the shortest way, or alpha, beta, gamma one after another."""
+    """Path of the platform from one position to the next: the shortest turn, or alpha, beta, gamma one after another."""
     measured_azimuth: bool
     """The azimuth psi_y^n is measured too."""
     work_limit: int
@@ -75,7 +76,7 @@ class GyroNoise(TypedDict, total=False):
 
 
 class Judged(TypedDict, total=False):
-    """What estimates are judged by."""
+    """Requirements, and the bench that adds to sigmas."""
 
     requirement: ByName
     """Largest standard deviation allowed at the end, in deg, deg/h, deg/h/g, ppm, arcsec, ug: ``{"D": 0.05}`` [default: none, so that nothing is judged]."""
@@ -85,7 +86,7 @@ class Judged(TypedDict, total=False):
 
 
 class Measured(Judged, total=False):
-    """How long and how well is measured."""
+    """Durations and noise of measurements."""
 
     dwell: Real
     """Dwell of positions that do not say theirs, in s [default: 1000]."""
@@ -107,10 +108,10 @@ class Measured(Judged, total=False):
 
 
 class Filtered(Measured, GyroNoise, total=False):
-    """What is simulated, and the filter."""
+    """Simulated truth and filter."""
 
     truth: Literal["linear", "exact"]
-    """What the simulated truth is: the model itself, or direction cosines."""
+    """Equations of the simulated truth: the model itself, or direction cosines."""
     filter: Literal["linear", "extended", "iterated"]
     """The filter [default: linear where its model holds, else iterated]."""
     slew_rate: Real
@@ -208,7 +209,7 @@ class Calibrate(Seeded, Assumed, Judged, GyroNoise, total=False):
     drift_noise: str
     """Random drift with its unit, as of a simulation."""
     gravity: Real
-    """What one g is, in m/s^2 [default: 9.80665]."""
+    """Value of one g, in m/s^2 [default: 9.80665]."""
     gate: Real
     """Probability that no measurement of a right record is left out as an outlier [default: 0.999]."""
 
@@ -221,7 +222,7 @@ class Allan(TypedDict, total=False):
     confidence: Real
     """Probability that a confidence band holds a deviation [default: 0.95]."""
     gravity: Real
-    """What one g is, in m/s^2 [default: 9.80665]."""
+    """Value of one g, in m/s^2 [default: 9.80665]."""
 
 
 class Design(Seeded, Assumed, Terms, Measured, total=False):
@@ -267,7 +268,7 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     slew_rate: Real
     """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
     gimbal: Names
-    """How far gimbals turn in degrees: ``["alpha=-90:90", "beta=-80:80"]``; alpha is the outer gimbal, about North, beta the middle one,
+    """Limits of the gimbal angles in degrees: ``["alpha=-90:90", "beta=-80:80"]``; alpha is the outer gimbal, about North, beta the middle one,
     gamma the inner one, about Z_p. Schemes have angles within the limits."""
 
 
@@ -283,7 +284,7 @@ class Measure(Seeded, total=False):
     cost: ByName
     """Costs of candidates by their names, above 0 [default: those of the file, or 1]: ``{"x1": 2.5}``."""
     keep: int
-    """How many minimal sets are listed [default: 10]."""
+    """Number of minimal sets that are listed [default: 10]."""
     order: int
     """The highest order of derivatives to look at in a model that has no proven end."""
     work_limit: int
@@ -304,7 +305,7 @@ class NextMeasurement(Seeded, Assumed, Terms, Measured, total=False):
     slew_rate: Real
     """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
     gimbal: Names
-    """How far gimbals turn in degrees: ``["alpha=-90:90"]``."""
+    """Limits of the gimbal angles in degrees: ``["alpha=-90:90"]``."""
 
 
 class Report(Seeded, Assumed, Filtered, total=False):

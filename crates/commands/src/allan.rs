@@ -29,7 +29,7 @@ pub struct Allan {
     #[arg(long, value_name = "P", default_value_t = CONFIDENCE, value_parser = number_within(PROBABILITY))]
     pub confidence: f64,
 
-    /// What one g is, in m/s^2 (9 to 10.5)
+    /// Value of one g, in m/s^2 (9 to 10.5)
     #[arg(long, value_name = "M_S2", default_value_t = STANDARD_GRAVITY, value_parser = number_within(GRAVITY))]
     pub gravity: f64,
 }

@@ -127,7 +127,7 @@ pub struct InputOptions {
     #[serde(flatten)]
     pub terms: TermOptions,
 
-    /// How the platform is turned from one position to the next. Torquer errors (GS, GM, GM3) act on the way
+    /// Path of the platform from one position to the next. Torquer errors (GS, GM, GM3) act on the way
     /// under inertial carry
     #[arg(long, value_name = "PATH", help_heading = "Assumptions", value_parser = one_of(PATHS))]
     pub path: Option<Path>,
@@ -179,7 +179,7 @@ const AXES: [Word<DefinedBy>; 3] = [
 #[command(next_help_heading = "Assumptions")]
 #[serde(default)]
 pub struct Assumptions {
-    /// What is carried between positions
+    /// Quantity that continues from one position to the next
     #[arg(long, value_name = "CARRY", value_parser = one_of(CARRIES))]
     pub carry: Option<Carry>,
 

@@ -103,7 +103,7 @@ pub struct Calibrate {
     #[serde(flatten)]
     pub gyro_noise: GyroNoiseOptions,
 
-    /// What one g is, in m/s^2 (9 to 10.5)
+    /// Value of one g, in m/s^2 (9 to 10.5)
     #[arg(long, value_name = "M_S2", default_value_t = STANDARD_GRAVITY, value_parser = number_within(GRAVITY))]
     pub gravity: f64,
 

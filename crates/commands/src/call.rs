@@ -22,7 +22,7 @@ use crate::designed::Designed;
 use crate::host::Host;
 use crate::paper::{Paper, paper};
 use crate::problem::Problem;
-use crate::procedure::{Procedure, procedure};
+use crate::procedure::{ProcedureRequest, procedure};
 use crate::report::{CalibrationFile, Report, origin, report};
 use crate::simulate::{Simulate, files as simulation_files, simulate};
 use crate::source::{Input, NamedInput, Source, title};
@@ -319,7 +319,7 @@ fn crosschecked<W: OutputForm>(request: Map<String, Value>, host: &mut Host<'_>)
 
 /// The sheet of a run.
 fn planned<W: OutputForm>(request: Map<String, Value>) -> Result<W::Out, Problem> {
-    let mut asked: CommandRequest<Procedure, Planning> = CommandRequest::read(request)?;
+    let mut asked: CommandRequest<ProcedureRequest, Planning> = CommandRequest::read(request)?;
     asked.options.input.given = asked.given;
     let Planning { sources, rotations } = asked.files;
     let planned = procedure(&asked.options, sources, rotations.as_ref())?;

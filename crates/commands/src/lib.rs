@@ -54,7 +54,7 @@ pub use next::FurtherOptions;
 pub use obsdeg_evidence::acceptance::AcceptanceReport;
 pub use paper::{Paper, paper};
 pub use problem::{Problem, ProblemKind, TextPlace};
-pub use procedure::{Dialect, Planned, Procedure, procedure};
+pub use procedure::{Dialect, Planned, ProcedureRequest, procedure};
 pub use report::{CalibrationFile, Report, Reviewed, calibration_report, origin, report};
 pub use simulate::{Run, Simulate, files as simulation_files, simulate};
 pub use source::{Expected, Input, ModelWithText, NamedInput, Source, title};

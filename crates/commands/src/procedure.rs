@@ -37,7 +37,7 @@ const DIALECTS: [Word<Dialect>; 2] = [
 /// Request of `procedure`: the scheme, and the conditions of its run.
 #[derive(Debug, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Procedure {
+pub struct ProcedureRequest {
     /// Seed of the verdicts
     #[arg(long, default_value_t = SEED, value_parser = whole::<u64>(ANY))]
     pub seed: u64,
@@ -74,7 +74,7 @@ pub struct Procedure {
     pub conditions: ConditionOptions,
 }
 
-impl Default for Procedure {
+impl Default for ProcedureRequest {
     fn default() -> Self {
         Self {
             seed: SEED,
@@ -103,7 +103,7 @@ pub struct Planned {
 /// # Errors
 /// [`Problem`] of the scheme, the table or an option.
 pub fn procedure(
-    a: &Procedure,
+    a: &ProcedureRequest,
     sources: Vec<Source>,
     rotations: Option<&Source>,
 ) -> Result<Planned, Problem> {
@@ -140,7 +140,7 @@ pub fn procedure(
 }
 
 /// Scheme file of a rotation table.
-fn of_table(a: &Procedure, table: &Source) -> Result<Source, Problem> {
+fn of_table(a: &ProcedureRequest, table: &Source) -> Result<Source, Problem> {
     // a table of obsdeg has its start in a comment
     let own = start_of_table(&table.text).unwrap_or("0,0,0").parse::<Attitude>();
     let own = || own.map_err(|e| Problem::input(format!("{}: its start: {e}", table.name)));

@@ -1,6 +1,6 @@
 //! Comparison of schemes.
 
-use obsdeg_evidence::compare::{ComparedScheme, Comparison, DropOne, Quantity};
+use obsdeg_evidence::compare::{ComparedQuantity, ComparedScheme, Comparison, DropOne};
 use obsdeg_evidence::requirements::{Requirements, Worst};
 use obsdeg_evidence::simulation::CoefficientFloor;
 
@@ -82,13 +82,13 @@ fn has_bench(schemes: &[ComparedScheme]) -> bool {
 }
 
 /// Uncertainty that requirements are compared with: the total with a bench, else sigma.
-pub(crate) fn deciding(q: &Quantity) -> Option<f64> {
+pub(crate) fn deciding(q: &ComparedQuantity) -> Option<f64> {
     q.total.or(q.sigma)
 }
 
 /// The unknowns of all schemes in the order of the first that has them.
-pub(crate) fn unknowns(schemes: &[ComparedScheme]) -> Vec<&Quantity> {
-    let mut out: Vec<&Quantity> = Vec::new();
+pub(crate) fn unknowns(schemes: &[ComparedScheme]) -> Vec<&ComparedQuantity> {
+    let mut out: Vec<&ComparedQuantity> = Vec::new();
     for q in schemes.iter().flat_map(|s| &s.quantities) {
         if !out.iter().any(|o| o.name == q.name) {
             out.push(q);
@@ -104,11 +104,13 @@ pub(crate) fn ratios(schemes: &[ComparedScheme]) -> DocumentBlock {
     let mut columns = vec![left("unknown"), left("unit")];
     columns.extend(judged.then(|| right("required")));
     columns.extend(schemes.iter().map(|s| right(s.name.clone())));
-    let own = |s: &ComparedScheme, q: &Quantity| s.quantities.iter().find(|own| own.name == q.name).cloned();
-    let row = |q: &Quantity| -> Vec<String> {
-        let found: Vec<Option<Quantity>> = schemes.iter().map(|s| own(s, q)).collect();
+    let own = |s: &ComparedScheme, q: &ComparedQuantity| {
+        s.quantities.iter().find(|own| own.name == q.name).cloned()
+    };
+    let row = |q: &ComparedQuantity| -> Vec<String> {
+        let found: Vec<Option<ComparedQuantity>> = schemes.iter().map(|s| own(s, q)).collect();
         let first = found[0].as_ref().and_then(deciding);
-        let cell = |(i, q): (usize, &Option<Quantity>)| {
+        let cell = |(i, q): (usize, &Option<ComparedQuantity>)| {
             let required = q.as_ref().and_then(|q| q.requirement);
             let Some(value) = q.as_ref().and_then(deciding) else {
                 return if required.is_some() { "- MISSED".into() } else { "-".into() };
@@ -196,7 +198,7 @@ fn half_turns(r: &ComparedScheme) -> String {
 }
 
 /// `1 0.7 0`.
-fn excitation(q: &Quantity) -> String {
+fn excitation(q: &ComparedQuantity) -> String {
     let short = |x: &f64| {
         let text = format!("{x:.2}");
         text.trim_end_matches('0').trim_end_matches('.').to_string()

@@ -38,7 +38,7 @@ pub(crate) enum LinkError {
 }
 
 /// A script with its imports and exports.
-struct Module<'a> {
+struct Script<'a> {
     file: &'a str,
     /// Names by the file that they are imported from.
     imports: Vec<(&'a str, Vec<&'a str>)>,
@@ -62,9 +62,9 @@ pub(crate) fn linked(scripts: &[(&str, &str)]) -> Result<String, LinkError> {
 }
 
 /// Reads the imports and exports of a script.
-fn module<'a>(file: &'a str, text: &'a str) -> Result<Module<'a>, LinkError> {
+fn module<'a>(file: &'a str, text: &'a str) -> Result<Script<'a>, LinkError> {
     let all = tokens(text);
-    let mut module = Module { file, imports: vec![], exports: vec![], tokens: vec![], body: String::new() };
+    let mut module = Script { file, imports: vec![], exports: vec![], tokens: vec![], body: String::new() };
     // offset of a token in the text
     let offset = |token: &str| token.as_ptr() as usize - text.as_ptr() as usize;
     let form = |expected, at: usize| {
@@ -122,7 +122,7 @@ fn export<'a>(all: &[&'a str], at: usize) -> Option<&'a str> {
 }
 
 /// Every import is of an export and is used, and every export is imported.
-fn imports_hold(modules: &[Module]) -> Result<(), LinkError> {
+fn imports_hold(modules: &[Script]) -> Result<(), LinkError> {
     let exports: HashMap<_, _> = modules.iter().map(|m| (m.file, &m.exports)).collect();
     let mut imported = HashSet::new();
     for module in modules {
@@ -154,7 +154,7 @@ fn imports_hold(modules: &[Module]) -> Result<(), LinkError> {
 }
 
 /// No script uses a name of another one that it neither imports nor declares.
-fn names_are_imported(modules: &[Module]) -> Result<(), LinkError> {
+fn names_are_imported(modules: &[Script]) -> Result<(), LinkError> {
     let top: Vec<_> = modules.iter().map(|m| (m.file, declared(&m.tokens, false))).collect();
     for module in modules {
         let mut known = declared(&module.tokens, true);
@@ -170,10 +170,10 @@ fn names_are_imported(modules: &[Module]) -> Result<(), LinkError> {
 
 /// Adds a module to `order` after all that it imports; `path` are the modules that import it.
 fn visit<'a>(
-    module: &'a Module<'a>,
-    modules: &'a [Module<'a>],
+    module: &'a Script<'a>,
+    modules: &'a [Script<'a>],
     path: &mut Vec<&'a str>,
-    order: &mut Vec<&'a Module<'a>>,
+    order: &mut Vec<&'a Script<'a>>,
 ) -> Result<(), LinkError> {
     if let Some(start) = path.iter().position(|file| *file == module.file) {
         return Err(LinkError::Circle(path[start..].join(", ")));
@@ -193,7 +193,7 @@ fn visit<'a>(
 }
 
 /// A module as a constant: the call of a function that returns its exports.
-fn emitted(module: &Module) -> String {
+fn emitted(module: &Script) -> String {
     let constant = |file: &str| format!("m_{}", file.trim_end_matches(".js"));
     let import = |(from, names): &(&str, Vec<&str>)| {
         format!("const {{ {} }} = {};\n", names.join(", "), constant(from))

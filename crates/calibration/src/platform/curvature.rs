@@ -19,7 +19,7 @@ use obsdeg_ekf::Manifold;
 use obsdeg_evidence::simulation::{Noise, PlatformState};
 
 use super::CalibrationError;
-use super::estimate::LinearisedRun;
+use super::estimate::LinearisedRecord;
 use super::estimate::{PlatformEstimate, PlatformProblem};
 use super::posterior::{PosteriorSample, normal_pairs};
 use crate::least_squares::{Linearised, StartInformation};
@@ -174,7 +174,7 @@ impl PlatformProblem<'_> {
     fn bend(&self, estimate: &PlatformEstimate, a: &DVector<f64>) -> Result<f64, CalibrationError> {
         let x = self.moved(&estimate.at.x, a);
         let mut sum = 0.0;
-        for (r, (own, LinearisedRun { run, .. })) in self.runs.iter().zip(&estimate.at.runs).enumerate() {
+        for (r, (own, LinearisedRecord { run, .. })) in self.runs.iter().zip(&estimate.at.runs).enumerate() {
             let Ok((there, _)) = own.along(self.conditions, &self.sigmas, &x[r]) else {
                 return Ok(f64::INFINITY);
             };

@@ -217,7 +217,7 @@ pub(crate) struct PlatformProblem<'a> {
 
 /// Run, linearised at the estimate.
 #[derive(Debug, Clone)]
-pub(crate) struct LinearisedRun {
+pub(crate) struct LinearisedRecord {
     /// Stages and residuals.
     pub run: Linearised,
     /// Measurement of every residual.
@@ -227,7 +227,7 @@ pub(crate) struct LinearisedRun {
 /// All runs, linearised at the estimate.
 pub(crate) struct LinearisedRuns {
     pub x: Vec<PlatformState>,
-    pub runs: Vec<LinearisedRun>,
+    pub runs: Vec<LinearisedRecord>,
     pub information: Vec<StartInformation>,
     /// Sum of squares of all residuals, with those of constraining rows and prior information.
     pub cost: f64,
@@ -262,7 +262,7 @@ impl PlatformProblem<'_> {
         }
         let each = self.runs.iter().zip(&x).enumerate();
         let runs = each.map(|(r, (run, x))| run.along_parts(self.conditions, &self.sigmas, x, nodes(r)));
-        let runs = runs.map(|along| along.map(|(run, keys)| LinearisedRun { run, keys }));
+        let runs = runs.map(|along| along.map(|(run, keys)| LinearisedRecord { run, keys }));
         let runs = runs.collect::<Result<Vec<_>, _>>()?;
         let information =
             runs.iter().map(|r| StartInformation::of(&r.run)).collect::<Result<Vec<_>, EkfError>>()?;
@@ -385,7 +385,8 @@ impl PlatformProblem<'_> {
     /// Largest angle (rad) by which a step turns a platform anywhere in its run.
     pub(super) fn turn(&self, at: &LinearisedRuns, step: &DVector<f64>) -> f64 {
         let mut largest: f64 = 0.0;
-        for ((LinearisedRun { run, .. }, index), x) in at.runs.iter().zip(&self.unknowns.index).zip(&at.x) {
+        for ((LinearisedRecord { run, .. }, index), x) in at.runs.iter().zip(&self.unknowns.index).zip(&at.x)
+        {
             let own: Vec<f64> = index.iter().map(|&i| step[i]).collect();
             largest = largest.max(largest_turn(&own, x.attitudes()));
             run.carried(&own, |_, d| largest = largest.max(largest_turn(d, x.attitudes())));

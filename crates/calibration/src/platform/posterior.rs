@@ -12,7 +12,7 @@ use obsdeg_evidence::simulation::Noise;
 use super::CalibrationError;
 use super::estimate::{BOX, LinearisedRuns, PlatformEstimate, PlatformProblem, TURN};
 use crate::least_squares::{Linearised, RunState, StartInformation};
-use crate::platform::estimate::LinearisedRun;
+use crate::platform::estimate::LinearisedRecord;
 
 /// Most linearisations of a sample.
 const PASSES: usize = 25;
@@ -88,7 +88,7 @@ impl PlatformProblem<'_> {
     /// [`CalibrationError`] when a number is not finite.
     pub(super) fn equation(&self, estimate: &PlatformEstimate) -> Result<Option<Equation>, CalibrationError> {
         let mut all = Vec::with_capacity(self.runs.len());
-        for LinearisedRun { run, .. } in &estimate.at.runs {
+        for LinearisedRecord { run, .. } in &estimate.at.runs {
             let own = derivative(run);
             let columns = own.column_iter().map(|c| weighted(run, c.into_owned().as_slice()));
             let columns = columns.collect::<Result<Vec<_>, _>>()?;
@@ -110,7 +110,7 @@ impl PlatformProblem<'_> {
         at: &LinearisedRuns,
     ) -> DMatrix<f64> {
         let mut out: DMatrix<f64> = beside.iter().map(|rows| rows.transpose() * rows).sum();
-        for ((LinearisedRun { run, .. }, weighted), index) in
+        for ((LinearisedRecord { run, .. }, weighted), index) in
             at.runs.iter().zip(weighted).zip(&self.unknowns.index)
         {
             let own = weighted.transpose() * derivative(run);
@@ -126,7 +126,7 @@ impl PlatformProblem<'_> {
         let [constraining, known] = &of.beside;
         let mut out = constraining.transpose() * self.constraint_residuals(constraining, &at.x)
             + known.transpose() * self.known_left(known, &at.x);
-        for ((LinearisedRun { run, .. }, weighted), index) in
+        for ((LinearisedRecord { run, .. }, weighted), index) in
             at.runs.iter().zip(&of.weighted).zip(&self.unknowns.index)
         {
             let own = weighted.transpose() * DVector::from_column_slice(&run.residuals);

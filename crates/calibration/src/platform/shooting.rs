@@ -15,7 +15,7 @@ use obsdeg_evidence::simulation::{Conditions, ExtendedFilter, PlatformState, Seg
 use super::CalibrationError;
 use super::estimate::{PlatformProblem, TURN, WEAK, largest_turn};
 use super::run::RecordedRun;
-use crate::platform::estimate::LinearisedRun;
+use crate::platform::estimate::LinearisedRecord;
 
 /// Most passes.
 const PASSES: usize = 40;
@@ -131,7 +131,7 @@ impl PlatformProblem<'_> {
             let step = self.step(&at, WEAK)?.x;
             let mut largest: f64 = 0.0;
             let mut moves: Vec<(Vec<f64>, Vec<Vec<f64>>)> = Vec::with_capacity(parts.len());
-            for (r, (part, LinearisedRun { run, .. })) in parts.iter().zip(&at.runs).enumerate() {
+            for (r, (part, LinearisedRecord { run, .. })) in parts.iter().zip(&at.runs).enumerate() {
                 let attitudes = part.start.attitudes();
                 let own: Vec<f64> = self.unknowns.index[r].iter().map(|&i| step[i]).collect();
                 largest = largest.max(largest_turn(&own, attitudes));

@@ -22,7 +22,7 @@ use obsdeg_evidence::simulation::{
 };
 
 use super::CalibrationError;
-use super::estimate::LinearisedRun;
+use super::estimate::LinearisedRecord;
 use super::estimate::{PlatformEstimate, PlatformProblem};
 use super::offset::Later;
 use super::run::{MeasurementKey, RecordedRun};
@@ -214,7 +214,7 @@ fn tested(
         shown,
     };
     let mut changes = Vec::new();
-    for (r, (run, LinearisedRun { run: linear, keys })) in
+    for (r, (run, LinearisedRecord { run: linear, keys })) in
         problem.runs.iter().zip(&estimate.at.runs).enumerate()
     {
         let columns = columns(run, model, keys, run.tilts(problem.conditions, &estimate.at.x[r])?)?;

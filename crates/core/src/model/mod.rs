@@ -45,7 +45,7 @@ pub use gimbal_turns::{BeyondLimits, GimbalReport, GimbalStop, GimbalTurn};
 pub use gimbals::{GIMBAL_NAMES, GimbalError, Gimbals, euler_of};
 pub use matrices::{MatricesError, PlatformMatrices, earth_rates, platform_matrices};
 pub use observed::{LOCAL, Observed, PSI_EPS};
-pub use omitted::{MAX_ATTITUDES, OmittedEffect, OmittedModel, OmittedTerm};
+pub use omitted::{MAX_ATTITUDES, OmittedKind, OmittedModel, OmittedTerm};
 pub use omitted_names::{may_be_omitted, omitted_meant, omitted_unit};
 pub use path::{Path, PathError, PathStep, TurnAt};
 pub use per_gyro::{PerGyro, PerGyroError};

@@ -27,9 +27,9 @@ use super::terms::{ErrorSource, Term, Unknowns};
 /// Largest number of positions whose attitude errors are treated one by one.
 pub const MAX_ATTITUDES: usize = 64;
 
-/// Effect of an error that is not estimated.
+/// Kind of an error that is not estimated: the place at which it enters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum OmittedEffect {
+pub enum OmittedKind {
     /// Coefficient of the error model.
     Coefficient,
     /// Latitude of the scheme minus true latitude.
@@ -59,7 +59,7 @@ pub struct OmittedTerm {
     /// Unit of the error's size: ug, ppm, arcsec, ...
     pub unit: &'static str,
     /// Effect of the error on the truth.
-    pub effect: OmittedEffect,
+    pub effect: OmittedKind,
 }
 
 /// All errors that a scheme does not estimate, in a fixed order: coefficients first.
@@ -95,7 +95,7 @@ impl OmittedModel {
             for term in omitted_families(&scheme.unknowns) {
                 for (name, entry) in term.coefficients(&scheme.geometry) {
                     let (family, unit) = (term.family(), term.unit());
-                    terms.push(OmittedTerm { name, family, unit, effect: OmittedEffect::Coefficient });
+                    terms.push(OmittedTerm { name, family, unit, effect: OmittedKind::Coefficient });
                     errors.push(entry);
                 }
             }
@@ -132,7 +132,7 @@ impl OmittedModel {
         c: &Matrix3<R::Element>,
     ) -> Columns<R::Element> {
         self.columns(ring, |effect, r| match effect {
-            OmittedEffect::Attitude { position: own, axis } if *own == position => Some(c[r][*axis].clone()),
+            OmittedKind::Attitude { position: own, axis } if *own == position => Some(c[r][*axis].clone()),
             _ => None,
         })
     }
@@ -149,10 +149,10 @@ impl OmittedModel {
         let mut out = self.errors.drift_rows(ring, c, || rate);
         let site = self.columns(ring, |effect, r| {
             Some(match (effect, r) {
-                (OmittedEffect::Latitude, 0) => ring.neg(w_u),
-                (OmittedEffect::Latitude, 1) | (OmittedEffect::EarthRate, 0) => w_n.clone(),
-                (OmittedEffect::Azimuth, 2) => ring.neg(w_n),
-                (OmittedEffect::EarthRate, 1) => w_u.clone(),
+                (OmittedKind::Latitude, 0) => ring.neg(w_u),
+                (OmittedKind::Latitude, 1) | (OmittedKind::EarthRate, 0) => w_n.clone(),
+                (OmittedKind::Azimuth, 2) => ring.neg(w_n),
+                (OmittedKind::EarthRate, 1) => w_u.clone(),
                 _ => return None,
             })
         });
@@ -167,7 +167,7 @@ impl OmittedModel {
     pub fn output_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
         let mut out = self.errors.accelerometer_rows(ring, c);
         let site =
-            self.columns(ring, |effect, r| (*effect == OmittedEffect::Gravity && r == 1).then(|| ring.one()));
+            self.columns(ring, |effect, r| (*effect == OmittedKind::Gravity && r == 1).then(|| ring.one()));
         let first = self.errors.terms().len();
         for (row, site) in out.iter_mut().zip(site) {
             row.extend_from_slice(&site[first..]);
@@ -241,7 +241,7 @@ impl OmittedModel {
     fn columns<R: Ring>(
         &self,
         ring: &R,
-        entry: impl Fn(&OmittedEffect, usize) -> Option<R::Element>,
+        entry: impl Fn(&OmittedKind, usize) -> Option<R::Element>,
     ) -> Columns<R::Element> {
         let of = |r: usize| {
             self.terms.iter().map(|t| entry(&t.effect, r).unwrap_or_else(|| ring.zero())).collect()
@@ -252,8 +252,7 @@ impl OmittedModel {
 
 /// Errors of the site and of the attitudes.
 fn site_terms(scheme: &Scheme) -> impl Iterator<Item = OmittedTerm> + use<> {
-    let effects =
-        [OmittedEffect::Latitude, OmittedEffect::Azimuth, OmittedEffect::EarthRate, OmittedEffect::Gravity];
+    let effects = [OmittedKind::Latitude, OmittedKind::Azimuth, OmittedKind::EarthRate, OmittedKind::Gravity];
     let site = SITE_FAMILIES.into_iter().zip(effects).map(|((family, unit), effect)| OmittedTerm {
         name: family.into(),
         family,
@@ -267,7 +266,7 @@ fn site_terms(scheme: &Scheme) -> impl Iterator<Item = OmittedTerm> + use<> {
             name: format!("attitude_{letter}@{}", position + 1),
             family: "attitude",
             unit: "arcsec",
-            effect: OmittedEffect::Attitude { position, axis },
+            effect: OmittedKind::Attitude { position, axis },
         })
     });
     site.chain(attitudes)

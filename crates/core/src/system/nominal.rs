@@ -16,7 +16,8 @@ use crate::language::{Node, Shapes, nearest};
 /// Numbers for a simulation, in the units of the model.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SimulationEntry {
+#[schemars(rename = "SimulationEntry")]
+pub(super) struct ModelSimulationEntry {
     /// Duration of every experiment, in the unit of `t`.
     #[schemars(with = "Option<f64>")]
     duration: Option<Spanned<f64>>,
@@ -58,7 +59,7 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
 pub(super) fn nominal(
     r: &ModelReader<'_>,
     outputs: &Shapes,
-    entry: &SimulationEntry,
+    entry: &ModelSimulationEntry,
     model: &mut SystemModel,
 ) -> Result<(), ModelError> {
     let reader = NominalReader { r, experiments: model.experiments };

@@ -43,13 +43,13 @@ pub struct ComparedScheme {
     /// Names of the positions, in order of time.
     pub positions: Vec<String>,
     /// Slews of finite duration, each with the position that it leads to.
-    pub slews: Vec<Slew>,
+    pub slews: Vec<ComparedSlew>,
     /// Total time of the scheme with slews, in s.
     pub total_s: f64,
     /// Rank with dwell (by derivatives if accuracy orders are not computed), then the number of unknowns.
     pub rank: [usize; 2],
     /// Verdict, sigma and requirement of each unknown.
-    pub quantities: Vec<Quantity>,
+    pub quantities: Vec<ComparedQuantity>,
     /// Largest sigma of a coefficient; null if one is not observable.
     pub worst: Option<Worst>,
     /// True if requirements are stated and every one is met.
@@ -80,7 +80,8 @@ pub struct ComparedScheme {
 
 /// Slew of finite duration to a position.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Slew {
+#[schemars(rename = "Slew")]
+pub struct ComparedSlew {
     /// Name of the position that the slew leads to.
     pub to: String,
     /// Turn of the slew: its axis and angle.
@@ -89,7 +90,8 @@ pub struct Slew {
 
 /// Verdict, sigma and requirement of one unknown of a scheme.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Quantity {
+#[schemars(rename = "Quantity")]
+pub struct ComparedQuantity {
     /// Name of the unknown, as in the scheme's model.
     pub name: String,
     /// Unit of sigma, of the requirement and of `sigma_extended`.

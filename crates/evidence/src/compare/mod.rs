@@ -155,7 +155,7 @@ fn review(entry: &Entry, seed: u64) -> Result<ComparedScheme, SimulationError> {
         carry: scheme.carry,
         conditions: MeasurementReport::new(scheme, conditions),
         positions: scheme.positions.iter().map(|p| p.name.clone()).collect(),
-        slews: slews.map(|(p, turn)| Slew { to: scheme.positions[p].name.clone(), turn }).collect(),
+        slews: slews.map(|(p, turn)| ComparedSlew { to: scheme.positions[p].name.clone(), turn }).collect(),
         total_s: judged.plan.duration_s(),
         rank: rank(&judged),
         meets_requirements: requirements.all_met(),
@@ -177,7 +177,7 @@ fn quantities(
     judged: &Attained,
     conditions: &Conditions,
     drop_one: &[DropOne],
-) -> Result<Vec<Quantity>, SimulationError> {
+) -> Result<Vec<ComparedQuantity>, SimulationError> {
     let platform = &judged.plan.platform;
     let requirements = resolve("required sigma", platform, &conditions.requirements, f64::NAN)?;
     let first_d = platform.names().len() - platform.coefficients();
@@ -191,7 +191,7 @@ fn quantities(
         let requirement = Some(requirements[c]).filter(|r| !r.is_nan());
         let sigma = judged.sigmas[c];
         let carries = drop_one.iter().filter(|d| d.lost.contains(name));
-        Quantity {
+        ComparedQuantity {
             name: name.clone(),
             unit: shown_unit(platform.units()[c]).into(),
             status: u.status,

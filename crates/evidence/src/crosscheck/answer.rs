@@ -56,7 +56,7 @@ pub struct CrossCheck {
     /// Number of independent directions that Z does not observe.
     pub defect: Count,
     /// Evidence c: covariance of the filter against the inverse information.
-    pub covariance: Vec<Difference>,
+    pub covariance: Vec<CovarianceDifference>,
     /// Evidence d: Monte Carlo statistics.
     pub monte_carlo: MonteCarlo,
     /// Evidence e: rank correlation of predicted and measured orders.
@@ -253,7 +253,8 @@ pub struct Count {
 
 /// Largest difference of two covariances.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct Difference {
+#[schemars(rename = "Difference")]
+pub struct CovarianceDifference {
     /// Covariances or models that are compared.
     pub name: String,
     /// Largest relative difference, dimensionless: `max |P_ij - Q_ij| / sqrt(Q_ii Q_jj)`.

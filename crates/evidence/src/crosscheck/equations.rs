@@ -3,7 +3,7 @@
 
 use obsdeg_ekf::{Measurement, Motion, Update};
 
-use super::answer::{Agreement, Difference};
+use super::answer::{Agreement, CovarianceDifference};
 use crate::simulation::SimulationError;
 use crate::simulation::conditions::Conditions;
 use crate::simulation::extended::ExtendedFilter;
@@ -22,7 +22,7 @@ const LIMIT: f64 = 1e-7;
 pub(super) fn difference(
     plan: &Plan,
     conditions: &Conditions,
-) -> Result<Option<Difference>, SimulationError> {
+) -> Result<Option<CovarianceDifference>, SimulationError> {
     if !plan.has_coefficients() || plan.torqued_at_once() {
         return Ok(None);
     }
@@ -48,7 +48,7 @@ pub(super) fn difference(
             add(row.amax());
         }
     }
-    Ok(Some(Difference {
+    Ok(Some(CovarianceDifference {
         name: "model against the equations of direction cosines at zero".into(),
         difference: largest,
         limit: LIMIT,

@@ -313,7 +313,10 @@ fn filter_method() -> String {
 }
 
 /// Evidence c: differences of the filter's covariances from the inverse information.
-fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Difference>, SimulationError> {
+fn covariances(
+    scheme: &Scheme,
+    conditions: &Conditions,
+) -> Result<Vec<CovarianceDifference>, SimulationError> {
     let still = still(conditions);
     let plan = Plan::new(scheme, &still)?;
     let start = RunStart::new(&plan, &still)?;
@@ -339,7 +342,7 @@ fn covariances(scheme: &Scheme, conditions: &Conditions) -> Result<Vec<Differenc
             false if coarse => Agreement::NotResolvable,
             false => Agreement::Disagrees,
         };
-        out.push(Difference {
+        out.push(CovarianceDifference {
             name: format!("{name} against the inverse information"),
             difference,
             limit,

@@ -4,7 +4,7 @@
 use obsdeg_core::degree::Status;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_design::review::{DesignReview, GenericReview, SchemeReview};
-use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::compare::{ComparedQuantity, ComparedScheme};
 use obsdeg_evidence::requirements::Requirements;
 
 use super::pictures::still;
@@ -18,7 +18,7 @@ use crate::{compare, stated, words};
 const ROWS: usize = 24;
 
 /// Outcome of one requirement, in words.
-fn margin(q: &Quantity) -> (String, Grade) {
+fn margin(q: &ComparedQuantity) -> (String, Grade) {
     match (q.requirement, q.margin, deciding(q)) {
         (Some(required), Some(m), Some(found)) if found <= required => {
             (format!("{} met", number(m)), Grade::Good)
@@ -339,7 +339,7 @@ fn sigmas(schemes: &[ComparedScheme]) -> DocumentBlock {
     let all = unknowns(schemes);
     let bench = schemes.iter().any(|s| s.conditions.bench.is_some());
     let of = |s: &ComparedScheme, name: &str| s.quantities.iter().find(|q| q.name == name).cloned();
-    let row = |q: &&Quantity| {
+    let row = |q: &&ComparedQuantity| {
         let required = || schemes.iter().filter_map(|s| of(s, &q.name)).map(|q| q.requirement);
         let same = required().all(|r| r == q.requirement);
         ChartRow {
@@ -372,7 +372,7 @@ mod tests {
 
     #[test]
     fn a_margin_is_met_or_missed_by_what_decides_requirements() {
-        let q = |requirement: Option<f64>, sigma: Option<f64>| Quantity {
+        let q = |requirement: Option<f64>, sigma: Option<f64>| ComparedQuantity {
             name: "D_FX".into(),
             unit: "deg/h".into(),
             status: Status::Observable,
@@ -388,7 +388,7 @@ mod tests {
             carried_by: Vec::new(),
         };
         // with a bench the total decides
-        let missed = Quantity { total: Some(0.5), margin: Some(0.2), ..q(Some(0.1), Some(0.05)) };
+        let missed = ComparedQuantity { total: Some(0.5), margin: Some(0.2), ..q(Some(0.1), Some(0.05)) };
         assert!(margin(&missed) == ("0.2000 MISSED".into(), Grade::Missed));
         for (requirement, sigma, expected, grade) in [
             (Some(0.1), Some(0.05), "2.000 met", Grade::Good),

@@ -4,7 +4,7 @@ use obsdeg_core::analysis::Analysis;
 use obsdeg_core::model::Pose;
 use obsdeg_core::system::SystemAnalysis;
 use obsdeg_design::review::{SchemeReview, Sweep};
-use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::compare::{ComparedQuantity, ComparedScheme};
 use obsdeg_evidence::crosscheck::{CrossCheck, SlopeCurve};
 use obsdeg_evidence::simulation::Traces;
 
@@ -133,7 +133,11 @@ pub(super) fn attitudes(s: &SchemeReview, name: &str) -> DocumentBlock {
 }
 
 /// Map of the drift that each coefficient causes at each position.
-pub(super) fn excitation(coefficients: &[&Quantity], positions: &[String], name: &str) -> DocumentBlock {
+pub(super) fn excitation(
+    coefficients: &[&ComparedQuantity],
+    positions: &[String],
+    name: &str,
+) -> DocumentBlock {
     let rows: Vec<String> = coefficients.iter().map(|q| q.name.clone()).collect();
     let values =
         coefficients.iter().map(|q| q.excitation.iter().map(|x| x.abs().min(1.0)).collect()).collect();

@@ -1,7 +1,7 @@
 //! Positions of a scheme, and their numbers.
 
 use obsdeg_design::review::SchemeReview;
-use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::compare::{ComparedQuantity, ComparedScheme};
 
 use super::pictures;
 use super::sections::seconds;
@@ -46,7 +46,7 @@ pub(super) fn positions(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, id: &
 /// Gravity along the axes of the gyros at each position, and what each position excites.
 pub(super) fn numbers(
     s: &SchemeReview,
-    coefficients: &[&Quantity],
+    coefficients: &[&ComparedQuantity],
     review: &ComparedScheme,
     id: &str,
 ) -> Vec<DocumentBlock> {

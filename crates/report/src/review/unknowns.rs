@@ -1,7 +1,7 @@
 //! Unknowns of a scheme: their verdicts and sigmas, the null space and the solving expressions.
 
 use obsdeg_core::analysis::Analysis;
-use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::compare::{ComparedQuantity, ComparedScheme};
 
 use super::sections::joined;
 use crate::analysis::null_vector;
@@ -25,7 +25,7 @@ pub(super) fn not_estimated(review: &ComparedScheme) -> Vec<DocumentBlock> {
 pub(super) fn unknowns(a: &Analysis, review: &ComparedScheme) -> DocumentBlock {
     let row = |q: &obsdeg_core::analysis::Quantity| {
         let predicted = review.quantities.iter().find(|p| p.name == q.name);
-        let of = |value: fn(&Quantity) -> Option<f64>| optional(predicted.and_then(value));
+        let of = |value: fn(&ComparedQuantity) -> Option<f64>| optional(predicted.and_then(value));
         let excited = predicted.map_or_else(Vec::new, |p| {
             let names = review.positions.iter().zip(&p.excitation).filter(|(_, e)| **e > 1e-9);
             names.map(|(n, _)| n.as_str()).collect()

@@ -2,7 +2,7 @@
 
 use obsdeg_core::degree::Status;
 use obsdeg_design::review::SchemeReview;
-use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::compare::{ComparedQuantity, ComparedScheme};
 use obsdeg_evidence::simulation::Outcome;
 
 use super::sections::{derivatives, duration, joined};
@@ -10,7 +10,7 @@ use crate::document::{Grade, StatusBox, StatusRow, number};
 use crate::{gimbals, omitted, stated, words};
 
 /// Name for the unknowns besides psi.
-fn kind(coefficients: &[&Quantity]) -> &'static str {
+fn kind(coefficients: &[&ComparedQuantity]) -> &'static str {
     match coefficients.first() {
         Some(q) if q.name.starts_with("eps") => "components of the drift",
         _ if coefficients.iter().any(|q| !q.name.starts_with("D_")) => "coefficients",
@@ -123,8 +123,13 @@ fn requirements(s: &SchemeReview, review: &ComparedScheme) -> (Grade, String) {
 }
 
 /// Verdict: missed requirements, limits, determined unknowns, accuracy.
-pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients: &[&Quantity]) -> String {
-    let with_dwell: Vec<&Quantity> = coefficients.iter().filter(|q| q.sigma.is_some()).copied().collect();
+pub(super) fn sentences(
+    s: &SchemeReview,
+    review: &ComparedScheme,
+    coefficients: &[&ComparedQuantity],
+) -> String {
+    let with_dwell: Vec<&ComparedQuantity> =
+        coefficients.iter().filter(|q| q.sigma.is_some()).copied().collect();
     let first = determined(s, coefficients, &with_dwell);
     let accuracy = accuracy(review, &with_dwell);
     let limits = limits(s);
@@ -140,10 +145,14 @@ pub(super) fn sentences(s: &SchemeReview, review: &ComparedScheme, coefficients:
 
 /// Number of unknowns that the scheme determines, with their degrees, and the unknowns that it does not.
 /// `with_dwell` are those of `coefficients` that samples determine.
-fn determined(s: &SchemeReview, coefficients: &[&Quantity], with_dwell: &[&Quantity]) -> String {
+fn determined(
+    s: &SchemeReview,
+    coefficients: &[&ComparedQuantity],
+    with_dwell: &[&ComparedQuantity],
+) -> String {
     let a = &s.analysis;
     let of = |status: Status| coefficients.iter().filter(move |q| q.status == status);
-    let seen: Vec<&&Quantity> = of(Status::Observable).collect();
+    let seen: Vec<&&ComparedQuantity> = of(Status::Observable).collect();
     let (all, what) = (coefficients.len(), kind(coefficients));
     let same = seen.iter().map(|q| &q.name).eq(with_dwell.iter().map(|q| &q.name));
     let mut first = match (seen.len(), same) {
@@ -160,7 +169,7 @@ fn determined(s: &SchemeReview, coefficients: &[&Quantity], with_dwell: &[&Quant
         let degrees = seen.iter().map(|q| (q.name.as_str(), q.degree));
         first.push_str(&format!(", {}", derivatives(worst, degrees)));
     }
-    let partners = |q: &&&Quantity| {
+    let partners = |q: &&&ComparedQuantity| {
         let verdict = a.quantities.iter().find(|v| v.name == q.name);
         let partners = verdict.map_or_else(String::new, |v| v.partners.join(", "));
         format!("{} from {partners}", q.name)
@@ -179,9 +188,9 @@ fn determined(s: &SchemeReview, coefficients: &[&Quantity], with_dwell: &[&Quant
 }
 
 /// Largest predicted sigma of the coefficients that samples determine, and the largest total with a bench.
-fn accuracy(review: &ComparedScheme, with_dwell: &[&Quantity]) -> String {
+fn accuracy(review: &ComparedScheme, with_dwell: &[&ComparedQuantity]) -> String {
     // other units do not compare
-    let rates: Vec<&Quantity> = match with_dwell.iter().any(|q| q.unit.starts_with("deg/h")) {
+    let rates: Vec<&ComparedQuantity> = match with_dwell.iter().any(|q| q.unit.starts_with("deg/h")) {
         true => with_dwell.iter().filter(|q| q.unit.starts_with("deg/h")).copied().collect(),
         false => with_dwell.to_vec(),
     };
@@ -273,12 +282,13 @@ fn row(what: &'static str, grade: Grade, text: String) -> StatusRow {
 /// Numbers of observable unknowns, by derivatives and with dwell; `lost` have a degree that dwell takes away.
 fn observable(s: &SchemeReview, review: &ComparedScheme, lost: &[&str]) -> String {
     let of = |psi: bool| review.quantities.iter().filter(move |q| q.name.starts_with("psi") == psi);
-    let count = |psi: bool, seen: fn(&&Quantity) -> bool| {
+    let count = |psi: bool, seen: fn(&&ComparedQuantity) -> bool| {
         format!("{} of {}", of(psi).filter(seen).count(), of(psi).count())
     };
-    let coefficients: Vec<&Quantity> = of(false).collect();
+    let coefficients: Vec<&ComparedQuantity> = of(false).collect();
     let what = kind(&coefficients);
-    let [by, with]: [fn(&&Quantity) -> bool; 2] = [|q| q.status == Status::Observable, |q| q.sigma.is_some()];
+    let [by, with]: [fn(&&ComparedQuantity) -> bool; 2] =
+        [|q| q.status == Status::Observable, |q| q.sigma.is_some()];
     let text = format!("{} {what}, {} of psi", count(false, by), count(true, by));
     let observable = if review.quantities.iter().all(|q| by(&q) == with(&q)) {
         text

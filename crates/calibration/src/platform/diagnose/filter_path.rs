@@ -12,7 +12,7 @@ use super::super::estimate::{PlatformEstimate, PlatformProblem};
 use super::super::run::MeasurementKey;
 use crate::answer::SecondPath;
 use crate::least_squares::{Linearised, RunState, StackedRows, StartInformation};
-use crate::platform::estimate::LinearisedRun;
+use crate::platform::estimate::LinearisedRecord;
 
 /// Factor by which the prior of the filter is wider than that of the scheme.
 const WIDE: f64 = 100.0;
@@ -111,7 +111,7 @@ impl Diagnosed {
             alone: Vec::new(),
             white: RefCell::default(),
         };
-        for (r, LinearisedRun { run, keys }) in estimate.at.runs.iter().enumerate() {
+        for (r, LinearisedRecord { run, keys }) in estimate.at.runs.iter().enumerate() {
             let prior = wide_prior(problem, r);
             let path = FilterPath::along(run, &prior)?;
             out.add(r, run, keys, &path);

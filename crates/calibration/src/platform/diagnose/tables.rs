@@ -11,7 +11,7 @@ use super::data::{AnswerData, ReportedFunctional};
 use crate::answer::HeldUnknown;
 use crate::answer::{Assumed, ChannelFit, Moved, PositionFit, RecordReport};
 use crate::least_squares::StartInformation;
-use crate::platform::estimate::LinearisedRun;
+use crate::platform::estimate::LinearisedRecord;
 use crate::setup::Setup;
 
 impl AnswerData<'_> {
@@ -49,7 +49,7 @@ impl AnswerData<'_> {
         p: usize,
         determined: &[&ReportedFunctional],
     ) -> Result<(Option<Moved>, Vec<String>), EkfError> {
-        let LinearisedRun { run, keys } = &self.estimate.at.runs[r];
+        let LinearisedRecord { run, keys } = &self.estimate.at.runs[r];
         let keep: Vec<bool> = keys.iter().map(|k| k.position != p).collect();
         let rest = StartInformation::of(&run.without(&keep))?;
         let solution = self.problem.step_with(&self.estimate.at, WEAK, Some((r, &rest)))?;

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_spanned::Spanned;
 use toml::Value;
 
-use super::super::nominal::SimulationEntry;
+use super::super::nominal::ModelSimulationEntry;
 use crate::model::recording::ModelRecord;
 use crate::title_block::TitleBlock;
 
@@ -104,7 +104,7 @@ pub struct ModelFile {
     pub(super) candidates: BTreeMap<String, Spanned<Value>>,
     /// Numbers for `obsdeg simulate --model`, in the units of the model.
     #[serde(default)]
-    pub(super) simulation: SimulationEntry,
+    pub(super) simulation: ModelSimulationEntry,
     /// Reading of the record of `obsdeg calibrate --model`: columns, known values and intervals at rest.
     #[schemars(with = "Option<ModelRecord>")]
     pub(super) record: Option<Spanned<ModelRecord>>,

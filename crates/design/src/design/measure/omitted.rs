@@ -9,7 +9,7 @@
 
 use obsdeg_core::model::settings::Assignment;
 use obsdeg_core::model::slew::W_IE;
-use obsdeg_core::model::{AZIMUTH, Carry, LOCAL, OmittedEffect, OmittedModel, PSI_EPS, Platform, Scheme};
+use obsdeg_core::model::{AZIMUTH, Carry, LOCAL, OmittedKind, OmittedModel, PSI_EPS, Platform, Scheme};
 use obsdeg_evidence::simulation::omitted::Bench;
 use obsdeg_evidence::simulation::{Conditions, si_per_shown};
 
@@ -100,7 +100,7 @@ impl OmittedErrors {
         };
         let counted = |j: &usize| {
             let t = &all.terms()[*j];
-            !matches!(t.effect, OmittedEffect::Attitude { .. })
+            !matches!(t.effect, OmittedKind::Attitude { .. })
                 && (size(t.family, &t.name, t.unit) > 0.0 || largest_of(t.family, &t.name, t.unit).is_some())
         };
         let kept: Vec<usize> = (0..all.terms().len()).filter(counted).collect();
@@ -117,7 +117,7 @@ impl OmittedErrors {
         let rate = |t: &&str| matches!(*t, "GS" | "GM" | "latitude" | "azimuth" | "earth_rate");
         let largest = of.iter().map(|(f, _, _)| if rate(f) { W_IE } else { 1.0 }).collect();
         let alike =
-            all.terms().iter().filter(|t| !matches!(t.effect, OmittedEffect::Attitude { .. })).all(|t| {
+            all.terms().iter().filter(|t| !matches!(t.effect, OmittedKind::Attitude { .. })).all(|t| {
                 let whole = all.terms().iter().filter(|o| o.family == t.family);
                 let mut each =
                     whole.map(|o| (size(o.family, &o.name, o.unit), largest_of(o.family, &o.name, o.unit)));

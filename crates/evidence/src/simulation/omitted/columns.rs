@@ -10,7 +10,7 @@
 use nalgebra::DMatrix;
 use obsdeg_core::model::slew::{Slew, apply, rotation, rotation_vector, times, transpose};
 use obsdeg_core::model::{
-    AZIMUTH, Carry, Columns, Float, LOCAL, Matrix3, OmittedEffect, OmittedModel, OmittedTerm, Platform,
+    AZIMUTH, Carry, Columns, Float, LOCAL, Matrix3, OmittedKind, OmittedModel, OmittedTerm, Platform,
     PlatformPoint, local_dynamics,
 };
 use obsdeg_ekf::integrate::van_loan;
@@ -236,7 +236,7 @@ impl<'a> OmittedColumns<'a> {
         let there = vectors(&self.model.drift_rows(&Float, &times(e, c), rate, [&w_n, &w_u]));
         // a wrong command is the same in platform axes
         let turned = |(d, t): ([f64; 3], &OmittedTerm)| match t.effect {
-            OmittedEffect::Coefficient => d,
+            OmittedKind::Coefficient => d,
             _ => apply(e, &d),
         };
         there.into_iter().zip(self.model.terms()).map(turned).collect()
