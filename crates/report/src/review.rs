@@ -18,7 +18,7 @@ mod verdict;
 
 use obsdeg_calibration::Calibration;
 use obsdeg_design::review::{DesignReview, SchemeReview};
-use obsdeg_evidence::compare::{ComparedScheme, Quantity};
+use obsdeg_evidence::compare::{ComparedQuantity, ComparedScheme};
 
 use crate::Answer;
 use crate::document::{Document, DocumentBlock, Fold};
@@ -190,7 +190,7 @@ fn certificates(origin: &Origin) -> Option<DocumentBlock> {
 /// Two pages and the appendix of a scheme. Of several schemes a printed page has the two pages alone.
 fn scheme(blocks: &mut Vec<DocumentBlock>, s: &SchemeReview, review: &ComparedScheme, alone: bool, id: &str) {
     let level = if alone { 1 } else { 2 };
-    let coefficients: Vec<&Quantity> =
+    let coefficients: Vec<&ComparedQuantity> =
         review.quantities.iter().filter(|q| !q.name.starts_with("psi")).collect();
     blocks.push(section(level, "Verdict"));
     verdict(blocks, s, review, &coefficients);
@@ -237,7 +237,7 @@ fn verdict(
     blocks: &mut Vec<DocumentBlock>,
     s: &SchemeReview,
     review: &ComparedScheme,
-    coefficients: &[&Quantity],
+    coefficients: &[&ComparedQuantity],
 ) {
     let a = &s.analysis;
     blocks.push(DocumentBlock::Text(verdict::sentences(s, review, coefficients)));
@@ -284,7 +284,7 @@ fn alike(notes: &[String]) -> Vec<String> {
 fn appendix(
     s: &SchemeReview,
     review: &ComparedScheme,
-    coefficients: &[&Quantity],
+    coefficients: &[&ComparedQuantity],
     id: &str,
 ) -> Vec<(&'static str, Vec<DocumentBlock>)> {
     let a = &s.analysis;
