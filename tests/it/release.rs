@@ -23,18 +23,25 @@ fn crates() -> Vec<PathBuf> {
     std::iter::once(PathBuf::new()).chain(members.map(|m| m.as_str().expect("a folder").into())).collect()
 }
 
-/// Text files for readers, below a folder.
-fn texts(folder: &Path) -> Vec<PathBuf> {
+/// Files below a folder with one of these extensions.
+fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut out = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         if path.is_dir() && !name.starts_with('.') && name != "target" && name != "snapshots" {
-            out.extend(texts(&path));
-        } else if name.ends_with(".md") && name != "Symbolica-License.md" {
+            out.extend(files(&path, extensions));
+        } else if path.extension().is_some_and(|e| extensions.iter().any(|of| e == *of)) {
             out.push(path);
         }
     }
+    out
+}
+
+/// Text files for readers, below a folder.
+fn texts(folder: &Path) -> Vec<PathBuf> {
+    let mut out = files(folder, &["md"]);
+    out.retain(|path| !path.ends_with("Symbolica-License.md"));
     out
 }
 
@@ -87,6 +94,54 @@ fn links_lead_somewhere() {
     assert_eq!(
         anchors("# A b-c, d: (e)\n\n```sh\n# no heading\n```\n"),
         BTreeSet::from(["a-b-c-d-e".to_string()])
+    );
+}
+
+/// Names that a text places in a file (`` `name` in `file.rs` ``), each with that file.
+fn placed_names(text: &str) -> Vec<(String, String)> {
+    let names = r"((?:`[A-Za-z_][\w:]*`(?:,? and|,)?\s+)+)";
+    let placed =
+        Regex::new(&format!(r"{names}(?:(?:of|in)\s+|\()`([\w/.-]+\.(?:rs|py|js))`")).expect("a pattern");
+    let name = Regex::new(r"`([\w:]+)`").expect("a pattern");
+    let each = placed.captures_iter(text).flat_map(|c| {
+        let all = name.captures_iter(c.get(1).expect("names").as_str());
+        all.map(|n| (n[1].to_string(), c[2].to_string())).collect::<Vec<_>>()
+    });
+    each.collect()
+}
+
+/// True if the text of a file defines a name: an item, a variant, a field or an argument. A path may also be
+/// used there.
+fn defines(text: &str, name: &str) -> bool {
+    if name.contains("::") {
+        return text.contains(name) || name.split("::").all(|part| defines(text, part));
+    }
+    let item = "fn|struct|enum|trait|impl|type|const|static|mod|def|class|let|let mut";
+    let pattern = format!(r"(?m)\b(?:{item})\s+{name}\b|^\s*(?:pub(?:\([^)]*\))? )?{name}\s*[:,({{=]");
+    Regex::new(&pattern).expect("a pattern").is_match(text)
+}
+
+#[test]
+fn names_stand_in_the_files_that_are_named() {
+    let folders = ["crates", "tests", "python", "tools"];
+    let all: Vec<PathBuf> =
+        folders.iter().flat_map(|folder| files(&root().join(folder), &["rs", "py", "js"])).collect();
+    let mut count = 0;
+    for text in ["CONTRIBUTING.md", "crates/README.md"] {
+        for (name, file) in placed_names(&read(text)) {
+            let there = all.iter().filter(|path| path.ends_with(&file)).map(read);
+            assert!(there.into_iter().any(|file| defines(&file, &name)), "{text}: no `{name}` in {file}");
+            count += 1;
+        }
+    }
+    assert!(count > 40, "{count}");
+    let code = "pub enum AuditFinding {\n    Agree,\n}\nimpl AuditFinding {\n    fn words(self) {}\n}\n";
+    let found = ["AuditFinding", "Agree", "AuditFinding::words", "Finding", "AuditFinding::Differ"];
+    assert_eq!(found.map(|name| defines(code, name)), [true, true, true, false, false]);
+    let text = "`A` and `b` in `x.rs`, `C` (`y/z.py`: more)";
+    assert_eq!(
+        placed_names(text).iter().map(|(n, f)| format!("{n} {f}")).collect::<Vec<_>>(),
+        ["A x.rs", "b x.rs", "C y/z.py"]
     );
 }
 

@@ -183,14 +183,22 @@ pub(crate) fn swipe(browser: &mut Browser, from: [f64; 2], to: [f64; 2]) {
 
 /// Left, top, width and height (pixels) of an element after scrolling to it.
 pub(crate) fn place(browser: &mut Browser, selector: &str) -> [f64; 4] {
-    let place = browser.value(&format!(
+    let look = format!(
         "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{ block: 'center' }}); \
          const r = e.getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; }})()"
-    ));
+    );
+    // late answers move what is below them: the place is taken once it stays
+    let mut place = browser.value(&look);
+    for _ in 0..40 {
+        browser.settle();
+        let before = std::mem::replace(&mut place, browser.value(&look));
+        if before == place {
+            break;
+        }
+    }
     [0, 1, 2, 3].map(|k| place[k].as_f64().expect("a number"))
 }
 
-/// Position of a slider's thumb at a value from -180 to 180 (deg).
 pub(crate) fn thumb(browser: &mut Browser, axis: &str, value: f64) -> [f64; 2] {
     let [x, y, w, h] = place(browser, &format!("#{axis}"));
     [x + 8.0 + (w - 16.0) * (value + 180.0) / 360.0, y + h / 2.0]

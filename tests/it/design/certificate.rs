@@ -327,7 +327,10 @@ fn no_scheme_of_tasks_is_below_the_bound(tasks: usize) {
         }
     }
     let part = |of: usize| of as f64 / tasks as f64;
-    assert!(part(close) > 0.4 && part(loose) < 0.03 && part(unknown) < 0.01, "{close} {loose} {unknown}");
+    assert!(
+        part(close) > 0.4 && part(loose) < 0.03 && part(unknown) < 0.01,
+        "close {close}, loose {loose}, unknown {unknown} of {held}"
+    );
 }
 
 fn of_d(positions: usize, candidates: Candidates, restarts: u64) -> Design {

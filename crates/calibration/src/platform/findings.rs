@@ -1,7 +1,7 @@
 //! Findings against a model and its sigmas, the most serious first. An answer with a finding is inconsistent.
 //!
 //! Tests have shares of the probability of a false alarm (`levels`); a finding with a certain cause has none.
-//! Sentences and recommended actions are in the crate `report` (`calibration`, `review/actions`).
+//! Sentences and recommended actions are in the crate `report` (`calibration_findings`, `review/actions`).
 
 use obsdeg_core::span::Span;
 use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};

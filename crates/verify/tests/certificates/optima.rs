@@ -43,7 +43,7 @@ fn candidates(rng: &mut SplitMix64, count: usize) -> Candidates {
 /// Random search with few sequences; carries and criteria alternate.
 fn draw(rng: &mut SplitMix64, i: usize) -> Task {
     let carry = [Carry::Platform, Carry::Inertial, Carry::Reset][i % 3];
-    let criterion = CRITERIA[i / 3 % 5];
+    let criterion = CRITERIA[i / 3 % CRITERIA.len()];
     let terms = *pick(rng, &["F", "F,I", "F,S", "F,O,S", "F,I,O,S", "K0", "F,K0", "K0,K1"]);
     let mixed =
         ["F,K0", "K0,K1"].contains(&terms) && !matches!(criterion, CriterionName::D | CriterionName::Margin);

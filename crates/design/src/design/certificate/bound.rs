@@ -204,7 +204,7 @@ mod tests {
             let limits = SigmaLimits { coefficients: vec![0.03; counting.len()], psi };
             let criteria =
                 [Criterion::Worst, Criterion::A, Criterion::D, Criterion::E, Criterion::Margin(limits)];
-            let criterion = &criteria[task % 5];
+            let criterion = &criteria[task % criteria.len()];
             let conditions = Conditions::default();
             let evaluator = Evaluator::new(&base, &candidates, &counting, &conditions).expect("an evaluator");
             let k = 3 + below(9);

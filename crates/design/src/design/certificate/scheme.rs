@@ -161,10 +161,9 @@ mod tests {
                 coefficients: counting.iter().map(|_| 10f64.powi(drawn(4) as i32 - 2)).collect(),
                 psi: [[0.01, 1.0, f64::INFINITY], [f64::INFINITY; 3]][drawn(2)],
             };
-            let criterion =
-                [Criterion::Worst, Criterion::A, Criterion::D, Criterion::E, Criterion::Margin(limits)]
-                    [task % 5]
-                    .clone();
+            let criteria =
+                [Criterion::Worst, Criterion::A, Criterion::D, Criterion::E, Criterion::Margin(limits)];
+            let criterion = criteria[task % criteria.len()].clone();
             let evaluator = Evaluator::new(&base, &candidates, &counting, &conditions).expect("an evaluator");
             let sequence: Vec<Stop> =
                 (0..candidates.len() + drawn(3)).map(|i| Stop::from(i % candidates.len())).collect();

@@ -1,9 +1,9 @@
 //! Criteria of optimal design, from the information of a sequence: functions of the covariance alone.
 //!
 //! The same criteria are bounded from above in `certificate/scheme`, from below in `certificate/bound`, and
-//! excluded by pairs of positions in `search/screen`. Here `of_attained` and `by_root`, elsewhere `bias_front`
-//! and `point` (`run/trade`) and `squared` (`certificate/exact`, for tests) end in a default, the criterion
-//! worst.
+//! excluded by pairs of positions in `search/screen`. Here `of_attained` and `by_root`, elsewhere
+//! `bias_front` and `point` (`run/trade`) and `squared` (`certificate/exact`, for tests) end in a default, the
+//! criterion worst.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::Carry;

@@ -583,10 +583,9 @@ mod tests {
                 coefficients: counting.iter().map(|_| 10f64.powi(below(5) as i32 - 3)).collect(),
                 psi: [0.01, 1.0, f64::INFINITY],
             };
-            let criterion =
-                [Criterion::Worst, Criterion::A, Criterion::D, Criterion::E, Criterion::Margin(limits)]
-                    [task % 5]
-                    .clone();
+            let criteria =
+                [Criterion::Worst, Criterion::A, Criterion::D, Criterion::E, Criterion::Margin(limits)];
+            let criterion = criteria[task % criteria.len()].clone();
             let evaluator = Evaluator::new(&base, &candidates, &counting, &conditions).expect("an evaluator");
             let screen = Screen::new(&evaluator, &criterion).expect("a screen");
             let count = candidates.len();
