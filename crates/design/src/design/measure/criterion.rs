@@ -2,8 +2,8 @@
 //!
 //! The same criteria are bounded from above in `certificate/scheme`, from below in `certificate/bound`, and
 //! excluded by pairs of positions in `search/screen`. Here `of_attained` and `by_root`, elsewhere
-//! `bias_front` and `point` (`run/trade`) and `squared` (`certificate/exact`, for tests) end in a default, the
-//! criterion worst.
+//! `bias_front` and `point` (`run/trade`) and `squared` (`certificate/exact`, for tests) end in a default,
+//! the criterion worst.
 
 use nalgebra::DMatrix;
 use obsdeg_core::model::Carry;
