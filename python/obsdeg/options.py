@@ -30,8 +30,8 @@ class Assumed(TypedDict, total=False):
     """Assumptions that hold for all schemes, whatever their files state."""
 
     carry: Carry | None
-    """Quantity that continues from one position to the next: psi in platform axes, as in the paper, psi in geographic axes (real torqued slews),
-    or none (a psi of its own each)."""
+    """Quantity that continues from one position to the next: psi in platform axes, as in the paper, psi in geographic
+    axes (real torqued slews), or none (a psi of its own each)."""
     latitude: Number | None
     """Latitude in degrees, exact; left out: generic, or 28.2 where numbers need one."""
 
@@ -55,7 +55,7 @@ class Positions(Assumed, Terms, total=False):
     combination: Names
     """Linear combinations of unknowns to be judged too, such as ``"D_IX - D_IY"``."""
     path: Literal["one-axis", "gimbals"]
-    """Path of the platform from one position to the next: the shortest turn, or alpha, beta, gamma one after another."""
+    """Path of the platform from one position to the next: the shortest turn, or alpha, beta, gamma one by one."""
     measured_azimuth: bool
     """The azimuth psi_y^n is measured too."""
     work_limit: int
@@ -268,8 +268,8 @@ class Design(Seeded, Assumed, Terms, Measured, total=False):
     slew_rate: Real
     """Positions are reached by rotations at this rate in deg/s; inertial carry only."""
     gimbal: Names
-    """Limits of the gimbal angles in degrees: ``["alpha=-90:90", "beta=-80:80"]``; alpha is the outer gimbal, about North, beta the middle one,
-    gamma the inner one, about Z_p. Schemes have angles within the limits."""
+    """Limits of the gimbal angles in degrees: ``["alpha=-90:90", "beta=-80:80"]``; alpha is the outer gimbal, about
+    North, beta the middle one, gamma the inner one, about Z_p. Schemes have angles within the limits."""
 
 
 class Measure(Seeded, total=False):

@@ -1,4 +1,4 @@
-"""Types of answers: a class for each type of their JSON. Written by `python/tools/write_shapes.py` from `obsdeg schema`; not by hand."""
+"""Types of answers: a class for each type of JSON. Written by `python/tools/write_shapes.py`, not by hand."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ SCHEMAS = [
     "allan",
     "audit",
 ]
-HEAD = '''"""Types of answers: a class for each type of their JSON. Written by `python/tools/write_shapes.py` from `obsdeg schema`; not by hand."""
+HEAD = '''"""Types of answers: a class for each type of JSON. Written by `python/tools/write_shapes.py`, not by hand."""
 
 from __future__ import annotations
 

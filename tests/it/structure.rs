@@ -317,8 +317,8 @@ fn parts_of_fields_have_names() {
     found.sort();
     found.dedup();
     assert_eq!(found, PAIRS);
-    let wrong = "struct A {\n    pub a: (f64, f64),\n    pub b: Vec<(String, f64, String)>,\n    pub c: Vec<Option<(usize, \
-                 usize)>>,\n    pub d: Vec<(usize, f64)>,\n}\n";
+    let wrong = "struct A {\n    pub a: (f64, f64),\n    pub b: Vec<(String, f64, String)>,\n    \
+                 pub c: Vec<Option<(usize, usize)>>,\n    pub d: Vec<(usize, f64)>,\n}\n";
     assert_eq!(fields_without_names(wrong), ["a", "b", "c"]);
 }
 

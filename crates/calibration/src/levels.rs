@@ -4,6 +4,15 @@
 //! divides its share by their number (Bonferroni), so that the sum of all shares bounds the probability that
 //! any test fails. The table stands in the book, too, in the chapter on calibration.
 
+use obsdeg_core::span::Span;
+use obsdeg_ekf::consistency::chi_square_band;
+
+/// Acceptance band of chi-square per degree of freedom, dimensionless: a right one is outside with this
+/// probability.
+pub(crate) fn band(degrees_of_freedom: f64, probability: f64) -> Span<f64> {
+    Span::from(chi_square_band(degrees_of_freedom, 1.0, 1.0 - probability)).over(degrees_of_freedom)
+}
+
 /// Probability that any test fails on a right record.
 pub const FAMILY: f64 = 0.01;
 

@@ -4,11 +4,10 @@
 //! Sentences and recommended actions are in the crate `report` (`calibration_findings`, `review/actions`).
 
 use obsdeg_core::span::Span;
-use obsdeg_ekf::consistency::{chi_square_band, chi_square_quantile};
+use obsdeg_ekf::consistency::chi_square_quantile;
 
 use super::diagnose::data::AnswerData;
-use super::gross::GrossReason;
-use super::gross::LeftOutCell;
+use super::gross::{GrossReason, LeftOutCell};
 use super::length::wrong;
 use super::run::RecordedRun;
 use super::successions::LeftOutMeasurement;
@@ -177,7 +176,7 @@ impl AnswerData<'_> {
         }
         for channel in &c.channels {
             let (dof, level) = (channel.degrees_of_freedom, levels::CHANNEL / c.channels.len() as f64);
-            let band = Span::from(chi_square_band(dof.max(1e-3), 1.0, 1.0 - level)).over(dof.max(1e-3));
+            let band = levels::band(dof.max(1e-3), level);
             if !band.contains(&channel.chi_square) {
                 out.push(CalibrationFinding::Channel {
                     channel: channel.channel.clone(),

@@ -1,8 +1,5 @@
 //! Chi-square of a fit against its degrees of freedom: of everything, and of what joining records adds.
 
-use obsdeg_core::span::Span;
-use obsdeg_ekf::consistency::chi_square_band;
-
 use super::diagnose::data::{AnswerData, ReportedFunctional};
 use crate::answer::{Fit, Repeatability};
 use crate::levels;
@@ -37,8 +34,7 @@ impl AnswerData<'_> {
         Fit {
             chi_square: left,
             degrees_of_freedom,
-            band: Span::from(chi_square_band(degrees_of_freedom.max(1.0), 1.0, 1.0 - levels::NOISE))
-                .over(degrees_of_freedom.max(1.0)),
+            band: levels::band(degrees_of_freedom.max(1.0), levels::NOISE),
             factor: mean.sqrt(),
             passes: self.estimate.passes,
         }
@@ -59,8 +55,7 @@ impl AnswerData<'_> {
             Repeatability {
                 chi_square: joined / degrees_of_freedom,
                 degrees_of_freedom,
-                band: Span::from(chi_square_band(degrees_of_freedom, 1.0, 1.0 - 2.0 * levels::REPEATABILITY))
-                    .over(degrees_of_freedom),
+                band: levels::band(degrees_of_freedom, 2.0 * levels::REPEATABILITY),
             }
         })
     }

@@ -366,6 +366,12 @@ mod tests {
 
     use super::*;
 
+    /// Row `i` of a record, at time `t` (s); the header is line 1.
+    fn row(i: usize, t: f64, values: [f64; 3]) -> MedianRow {
+        let line = i as u64 + 2;
+        MedianRow { lines: Span { from: line, to: line }, t, samples: 1, values, bin: i }
+    }
+
     /// Rows of a platform that drifts by thirteen degrees an hour about its second axis, with noise of 1e-5.
     fn rows(seed: u64) -> Vec<MedianRow> {
         let mut noise = Noise::new(seed, 0);
@@ -373,7 +379,7 @@ mod tests {
             let t = 10.0 * i as f64;
             let angle = 0.3 + 6.3e-5 * t;
             let values = [angle.cos(), 0.2, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
-            MedianRow { lines: (i as u64 + 2, i as u64 + 2).into(), t, samples: 1, values, bin: i }
+            row(i, t, values)
         };
         (0..250).map(of).collect()
     }
@@ -410,18 +416,12 @@ mod tests {
             let of = |i: usize| {
                 let angle = 0.1 * seed as f64 + 130f64.to_radians() / 3600.0 * 10.0 * i as f64;
                 let values = [angle.cos(), 0.0, angle.sin()].map(|x: f64| x + 1e-5 * noise.normal());
-                MedianRow {
-                    lines: (i as u64, i as u64).into(),
-                    t: 10.0 * i as f64,
-                    samples: 1,
-                    values,
-                    bin: i,
-                }
+                row(i, 10.0 * i as f64, values)
             };
             let mut rows: Vec<MedianRow> = (0..101).map(of).collect();
             assert!(cells(&rows, 1e-5, 5e-4).is_empty(), "{seed}: {:?}", cells(&rows, 1e-5, 5e-4));
             rows[100].values[0] += 3e-4;
-            found += usize::from(cells(&rows, 1e-5, 5e-4).iter().any(|c| c.lines.from == 100));
+            found += usize::from(cells(&rows, 1e-5, 5e-4).iter().any(|c| c.lines.from == 102));
         }
         assert_eq!(found, 20);
     }
@@ -436,13 +436,7 @@ mod tests {
         for _ in 0..10_000 {
             let of = |i: usize| {
                 let values = [0; 3].map(|_| (10.0 * noise.normal()).round() * 1e-6);
-                MedianRow {
-                    lines: (i as u64, i as u64).into(),
-                    t: 10.0 * i as f64,
-                    samples: 1,
-                    values,
-                    bin: i,
-                }
+                row(i, 10.0 * i as f64, values)
             };
             let own: Vec<MedianRow> = (0..100).map(of).collect();
             let equal = |w: &&[MedianRow]| (0..3).any(|k| w.iter().all(|r| r.values[k] == w[0].values[k]));

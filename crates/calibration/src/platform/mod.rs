@@ -45,7 +45,6 @@ use crate::setup::Setup;
 use estimate::RunUnknowns;
 use rounds::{CalibrationInputs, RoundEnd, Rounds};
 
-pub use crate::answer::ColumnRead;
 pub use mistaken::Mistaken;
 pub use reading::{CellRead, PositionRead, RecordRead, RecordsRead, read_records};
 pub(crate) use record_columns::TIMES;

@@ -10,9 +10,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use obsdeg_evidence::simulation::Noise;
 
 use super::CalibrationError;
-use super::estimate::{BOX, LinearisedRuns, PlatformEstimate, PlatformProblem, TURN};
+use super::estimate::{BOX, LinearisedRecord, LinearisedRuns, PlatformEstimate, PlatformProblem, TURN};
 use crate::least_squares::{Linearised, RunState, StartInformation};
-use crate::platform::estimate::LinearisedRecord;
 
 /// Most linearisations of a sample.
 const PASSES: usize = 25;

@@ -198,8 +198,8 @@ fn dwell_as_recorded(
     Ok(())
 }
 
-/// Bin at the end of each segment of a plan, and the changes of position, each of which
-/// is `open` by some time (s).
+/// Bin at the end of each segment of a plan, and the changes of position, each of which is `open` by some
+/// time (s).
 fn bins_of_segments(
     plan: &Plan,
     reading: &Reading,

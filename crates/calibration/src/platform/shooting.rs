@@ -13,9 +13,8 @@ use obsdeg_ekf::{Manifold, Update};
 use obsdeg_evidence::simulation::{Conditions, ExtendedFilter, PlatformState, SegmentKind};
 
 use super::CalibrationError;
-use super::estimate::{PlatformProblem, TURN, WEAK, largest_turn};
+use super::estimate::{LinearisedRecord, PlatformProblem, TURN, WEAK, largest_turn};
 use super::run::RecordedRun;
-use crate::platform::estimate::LinearisedRecord;
 
 /// Most passes.
 const PASSES: usize = 40;

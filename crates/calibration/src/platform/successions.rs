@@ -5,8 +5,7 @@ use obsdeg_core::span::Span;
 
 use super::CalibrationError;
 use super::diagnose::data::AnswerData;
-use super::gross::GrossReason;
-use super::gross::LeftOutCell;
+use super::gross::{GrossReason, LeftOutCell};
 use super::placed::channel_name;
 use super::run::RecordedRun;
 use crate::answer::{CalibrationFinding, Outlier};

@@ -2,7 +2,6 @@
 
 use obsdeg_core::degree::{Status, Verdict};
 use obsdeg_core::span::Span;
-use obsdeg_ekf::consistency::chi_square_band;
 
 use super::answer::SystemEstimated;
 use super::fit::{ModelRows, Settled};
@@ -60,7 +59,7 @@ impl FinalFit {
     /// Band of chi-square per degree of freedom.
     pub(super) fn band(&self) -> Span<f64> {
         let free = self.degrees_of_freedom as f64;
-        Span::from(chi_square_band(free, 1.0, 1.0 - levels::NOISE)).over(free)
+        levels::band(free, levels::NOISE)
     }
 
     /// Estimate of a functional by its name and unit.

@@ -56,8 +56,8 @@ fn gross_cells(cases: &[(f64, std::ops::Range<usize>, usize)]) {
                 let outlier =
                     c.outliers.iter().any(|o| o.lines == (line, line).into() && o.channel == column);
                 let code = c.findings.iter().any(|f| {
-                    matches!(f,
-                    CalibrationFinding::Cells { column: found, lines, .. } if *lines == (line, line).into() && found == column)
+                    matches!(f, CalibrationFinding::Cells { column: found, lines, .. }
+                        if *lines == (line, line).into() && found == column)
                 });
                 assert!(outlier || code, "{step_s} s, {column}, {what}: {:?} {:?}", c.outliers, c.findings);
                 // some samples are far from the line of a dense bin by chance

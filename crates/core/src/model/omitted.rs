@@ -58,8 +58,8 @@ pub struct OmittedTerm {
     pub family: &'static str,
     /// Unit of the error's size: ug, ppm, arcsec, ...
     pub unit: &'static str,
-    /// Effect of the error on the truth.
-    pub effect: OmittedKind,
+    /// Kind of the error: the place at which it enters.
+    pub kind: OmittedKind,
 }
 
 /// All errors that a scheme does not estimate, in a fixed order: coefficients first.
@@ -95,7 +95,7 @@ impl OmittedModel {
             for term in omitted_families(&scheme.unknowns) {
                 for (name, entry) in term.coefficients(&scheme.geometry) {
                     let (family, unit) = (term.family(), term.unit());
-                    terms.push(OmittedTerm { name, family, unit, effect: OmittedKind::Coefficient });
+                    terms.push(OmittedTerm { name, family, unit, kind: OmittedKind::Coefficient });
                     errors.push(entry);
                 }
             }
@@ -131,7 +131,7 @@ impl OmittedModel {
         position: usize,
         c: &Matrix3<R::Element>,
     ) -> Columns<R::Element> {
-        self.columns(ring, |effect, r| match effect {
+        self.columns(ring, |kind, r| match kind {
             OmittedKind::Attitude { position: own, axis } if *own == position => Some(c[r][*axis].clone()),
             _ => None,
         })
@@ -147,8 +147,8 @@ impl OmittedModel {
         [w_n, w_u]: [&R::Element; 2],
     ) -> Columns<R::Element> {
         let mut out = self.errors.drift_rows(ring, c, || rate);
-        let site = self.columns(ring, |effect, r| {
-            Some(match (effect, r) {
+        let site = self.columns(ring, |kind, r| {
+            Some(match (kind, r) {
                 (OmittedKind::Latitude, 0) => ring.neg(w_u),
                 (OmittedKind::Latitude, 1) | (OmittedKind::EarthRate, 0) => w_n.clone(),
                 (OmittedKind::Azimuth, 2) => ring.neg(w_n),
@@ -167,7 +167,7 @@ impl OmittedModel {
     pub fn output_rows<R: Ring>(&self, ring: &R, c: &Matrix3<R::Element>) -> Columns<R::Element> {
         let mut out = self.errors.accelerometer_rows(ring, c);
         let site =
-            self.columns(ring, |effect, r| (*effect == OmittedKind::Gravity && r == 1).then(|| ring.one()));
+            self.columns(ring, |kind, r| (*kind == OmittedKind::Gravity && r == 1).then(|| ring.one()));
         let first = self.errors.terms().len();
         for (row, site) in out.iter_mut().zip(site) {
             row.extend_from_slice(&site[first..]);
@@ -243,21 +243,20 @@ impl OmittedModel {
         ring: &R,
         entry: impl Fn(&OmittedKind, usize) -> Option<R::Element>,
     ) -> Columns<R::Element> {
-        let of = |r: usize| {
-            self.terms.iter().map(|t| entry(&t.effect, r).unwrap_or_else(|| ring.zero())).collect()
-        };
+        let of =
+            |r: usize| self.terms.iter().map(|t| entry(&t.kind, r).unwrap_or_else(|| ring.zero())).collect();
         [of(0), of(1), of(2)]
     }
 }
 
 /// Errors of the site and of the attitudes.
 fn site_terms(scheme: &Scheme) -> impl Iterator<Item = OmittedTerm> + use<> {
-    let effects = [OmittedKind::Latitude, OmittedKind::Azimuth, OmittedKind::EarthRate, OmittedKind::Gravity];
-    let site = SITE_FAMILIES.into_iter().zip(effects).map(|((family, unit), effect)| OmittedTerm {
+    let kinds = [OmittedKind::Latitude, OmittedKind::Azimuth, OmittedKind::EarthRate, OmittedKind::Gravity];
+    let site = SITE_FAMILIES.into_iter().zip(kinds).map(|((family, unit), kind)| OmittedTerm {
         name: family.into(),
         family,
         unit,
-        effect,
+        kind,
     });
     let positions = scheme.positions.len();
     let counted = if positions <= MAX_ATTITUDES && !scheme.rotates() { positions } else { 0 };
@@ -266,7 +265,7 @@ fn site_terms(scheme: &Scheme) -> impl Iterator<Item = OmittedTerm> + use<> {
             name: format!("attitude_{letter}@{}", position + 1),
             family: "attitude",
             unit: "arcsec",
-            effect: OmittedKind::Attitude { position, axis },
+            kind: OmittedKind::Attitude { position, axis },
         })
     });
     site.chain(attitudes)

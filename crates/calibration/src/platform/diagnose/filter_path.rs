@@ -8,11 +8,10 @@ use obsdeg_ekf::linear::{SmoothedStart, filter_pass, smoothed_start};
 use obsdeg_ekf::{Covariance, CovarianceForm, EkfError};
 use obsdeg_evidence::prediction::Prediction;
 
-use super::super::estimate::{PlatformEstimate, PlatformProblem};
+use super::super::estimate::{LinearisedRecord, PlatformEstimate, PlatformProblem};
 use super::super::run::MeasurementKey;
 use crate::answer::SecondPath;
 use crate::least_squares::{Linearised, RunState, StackedRows, StartInformation};
-use crate::platform::estimate::LinearisedRecord;
 
 /// Factor by which the prior of the filter is wider than that of the scheme.
 const WIDE: f64 = 100.0;

@@ -4,14 +4,12 @@ use obsdeg_core::model::AZIMUTH;
 use obsdeg_ekf::EkfError;
 use obsdeg_evidence::simulation::{latitude_of, shown_unit, si_per_shown};
 
-use super::super::estimate::{BOX, WEAK};
+use super::super::estimate::{BOX, LinearisedRecord, WEAK};
 use super::super::placed::channel_name;
 use super::LOST;
 use super::data::{AnswerData, ReportedFunctional};
-use crate::answer::HeldUnknown;
-use crate::answer::{Assumed, ChannelFit, Moved, PositionFit, RecordReport};
+use crate::answer::{Assumed, ChannelFit, HeldUnknown, Moved, PositionFit, RecordReport};
 use crate::least_squares::StartInformation;
-use crate::platform::estimate::LinearisedRecord;
 use crate::setup::Setup;
 
 impl AnswerData<'_> {

@@ -100,7 +100,7 @@ impl OmittedErrors {
         };
         let counted = |j: &usize| {
             let t = &all.terms()[*j];
-            !matches!(t.effect, OmittedKind::Attitude { .. })
+            !matches!(t.kind, OmittedKind::Attitude { .. })
                 && (size(t.family, &t.name, t.unit) > 0.0 || largest_of(t.family, &t.name, t.unit).is_some())
         };
         let kept: Vec<usize> = (0..all.terms().len()).filter(counted).collect();
@@ -116,16 +116,15 @@ impl OmittedErrors {
         // a rate of the platform is at least the earth rate
         let rate = |t: &&str| matches!(*t, "GS" | "GM" | "latitude" | "azimuth" | "earth_rate");
         let largest = of.iter().map(|(f, _, _)| if rate(f) { W_IE } else { 1.0 }).collect();
-        let alike =
-            all.terms().iter().filter(|t| !matches!(t.effect, OmittedKind::Attitude { .. })).all(|t| {
-                let whole = all.terms().iter().filter(|o| o.family == t.family);
-                let mut each =
-                    whole.map(|o| (size(o.family, &o.name, o.unit), largest_of(o.family, &o.name, o.unit)));
-                let own = (size(t.family, &t.name, t.unit), largest_of(t.family, &t.name, t.unit));
-                // axes of gyros are those of the geometry, which a turn changes
-                own == (0.0, None) && each.all(|o| o == own)
-                    || !t.unit.starts_with("deg/h") && each.all(|o| o == own)
-            });
+        let alike = all.terms().iter().filter(|t| !matches!(t.kind, OmittedKind::Attitude { .. })).all(|t| {
+            let whole = all.terms().iter().filter(|o| o.family == t.family);
+            let mut each =
+                whole.map(|o| (size(o.family, &o.name, o.unit), largest_of(o.family, &o.name, o.unit)));
+            let own = (size(t.family, &t.name, t.unit), largest_of(t.family, &t.name, t.unit));
+            // axes of gyros are those of the geometry, which a turn changes
+            own == (0.0, None) && each.all(|o| o == own)
+                || !t.unit.starts_with("deg/h") && each.all(|o| o == own)
+        });
         let alike = alike && sizes[first..].windows(2).all(|s| s[0] == s[1]);
         Self { model, sizes, immune, largest, attitudes, alike }
     }

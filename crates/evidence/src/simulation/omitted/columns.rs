@@ -235,7 +235,7 @@ impl<'a> OmittedColumns<'a> {
         let Some(e) = e else { return vectors(&self.model.drift_rows(&Float, c, rate, [&w_n, &w_u])) };
         let there = vectors(&self.model.drift_rows(&Float, &times(e, c), rate, [&w_n, &w_u]));
         // a wrong command is the same in platform axes
-        let turned = |(d, t): ([f64; 3], &OmittedTerm)| match t.effect {
+        let turned = |(d, t): ([f64; 3], &OmittedTerm)| match t.kind {
             OmittedKind::Coefficient => d,
             _ => apply(e, &d),
         };
